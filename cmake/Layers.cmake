@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: AGPL-3.0-or-later
+# One folder is one target: vorocast_folder() makes a library of a folder's sources, and of its *_main.cpp or main.cpp a program.
+# Layers, bottom to top: proto, services, then workers and scheduler side by side (they never link each other), then tests.
+
+function(vorocast_layer_of TARGET OUT)
+  string(REGEX MATCH "^(proto|services|workers|scheduler|tests)" layer "${TARGET}")
+  set(${OUT} "${layer}" PARENT_SCOPE)
+endfunction()
+
+# Refuses a link from a lower layer to a higher one, and any between workers and scheduler.
+function(vorocast_check_layers TARGET)
+  set(may_use_proto proto)
+  set(may_use_services proto services)
+  set(may_use_workers proto services workers)
+  set(may_use_scheduler proto services scheduler)
+  set(may_use_tests proto services workers scheduler tests)
+  vorocast_layer_of(${TARGET} own)
+  foreach(dependency IN LISTS ARGN)
+    vorocast_layer_of(${dependency} other)
+    if(other AND NOT other IN_LIST may_use_${own})
+      message(FATAL_ERROR "${TARGET} (layer ${own}) must not link ${dependency} (layer ${other})")
+    endif()
+  endforeach()
+endfunction()
+
+# vorocast_folder(PUBLIC folders and libraries its headers need  PRIVATE those only its sources need  PROGRAM name)
+# The target is named after the folder: services/geometry -> services_geometry. PROGRAM builds main.cpp into that program.
+function(vorocast_folder)
+  cmake_parse_arguments(ARG "" "PROGRAM" "PUBLIC;PRIVATE;PROGRAM_PRIVATE" ${ARGN})
+  file(RELATIVE_PATH folder ${CMAKE_SOURCE_DIR} ${CMAKE_CURRENT_SOURCE_DIR})
+  string(REPLACE "/" "_" target ${folder})
+  file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*.cpp)
+  list(FILTER sources EXCLUDE REGEX "/main\\.cpp$")
+  vorocast_check_layers(${target} ${ARG_PUBLIC} ${ARG_PRIVATE} ${ARG_PROGRAM_PRIVATE})
+  if(sources)
+    add_library(${target} STATIC ${sources})
+    target_include_directories(${target} PUBLIC ${CMAKE_SOURCE_DIR})
+    target_link_libraries(${target} PUBLIC ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE} vorocast_warnings)
+  else()
+    add_library(${target} INTERFACE)
+    target_include_directories(${target} INTERFACE ${CMAKE_SOURCE_DIR})
+    target_link_libraries(${target} INTERFACE ${ARG_PUBLIC})
+  endif()
+  if(ARG_PROGRAM)
+    add_executable(${ARG_PROGRAM} ${CMAKE_CURRENT_SOURCE_DIR}/main.cpp)
+    target_link_libraries(${ARG_PROGRAM} PRIVATE ${target} ${ARG_PROGRAM_PRIVATE} vorocast_warnings)
+  endif()
+endfunction()

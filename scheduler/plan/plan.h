@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "services/base/digest.h"
+#include "services/base/status.h"
+#include "services/tasks/options.h"
+#include "services/tasks/task.h"
+
+/// Pure: turns a take into tasks. No clock, no store, no messages.
+namespace vorocast::plan {
+
+struct PlannedFrame {
+  std::int32_t number = 0;
+  base::Digest blob;
+  std::string extension;
+};
+
+/// What a user asked for, checked and with defaults filled in.
+struct JobSpec {
+  tasks::TessellateOptions tessellate;
+  std::int32_t template_frame = -1;  // −1: chosen by the template task from the tessellated frames
+  std::int32_t patches = 200;
+  std::int32_t window_frames = 10;
+  std::int32_t overlap_frames = 3;  // frames that a window shares with the next
+  std::int32_t interpolated_max = 0;
+  double frames_per_second = 25;
+  tasks::TrackOptions track;
+  nlohmann::json effect;  // null: tracking only
+  bool sheets = true;
+};
+
+/// An input by name of the planned task that makes it; its digest is known when that task has ended.
+struct PlannedInput {
+  std::string role;
+  std::int32_t frame = -1;
+  std::string task;   // a PlannedTask's name; empty for a blob
+  base::Digest blob;  // with an empty task
+  std::string extension;
+  bool optional = false;  // may be missing: the frame is then interpolated
+};
+
+struct PlannedTask {
+  std::string name;  // unique within the job, for people: "frame 412: tessellate", "window 40-49: track", "pendulum: simulate"
+  tasks::Kind kind = tasks::Kind::kTessellate;
+  nlohmann::json options;
+  std::vector<PlannedInput> inputs;
+  std::string output;  // name for users, or empty: "cells/frame_000412.h5", "tracked.h5"
+};
+
+/// The tasks that can be named from the frames known so far. `closed`: no frame will follow, so everything can be named.
+/// Calling it again with more frames returns a superset: the same names with the same content, in the same order.
+absl::StatusOr<std::vector<PlannedTask>> Plan(const JobSpec& job, const std::vector<PlannedFrame>& frames, bool closed);
+
+/// The window [first, last) positions of each tracking window over `frame_count` frames.
+struct WindowRange {
+  std::int32_t first = 0;
+  std::int32_t last = 0;
+};
+std::vector<WindowRange> SplitWindows(std::int32_t frame_count, std::int32_t window_frames, std::int32_t overlap_frames);
+
+}  // namespace vorocast::plan

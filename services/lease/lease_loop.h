@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/time/time.h"
+#include "services/base/status.h"
+#include "services/lease/executor.h"
+
+namespace vorocast::lease {
+
+struct LeaseLoopOptions {
+  std::string scheduler;          // host:port, or unix:/path
+  std::int32_t slots = 1;         // tasks at once
+  std::filesystem::path program;  // run as `program execute-task` for each task
+  std::string name;               // empty: host, pid, start time
+  absl::Duration heartbeat = absl::Seconds(2);
+  absl::Duration drain_time = absl::Seconds(30);  // after SIGTERM, what still runs then is given back
+};
+
+/// Takes leases until told to stop (SIGTERM or SIGINT drains), each task in a child process with its memory and time limits.
+/// proto/dispatch.proto tells the protocol. Returns when drained.
+absl::Status RunLeaseLoop(const LeaseLoopOptions& options, const std::vector<tasks::Kind>& kinds);
+
+/// What `program execute-task` does: reads one task from standard input, runs its executor, writes progress and the outcome to standard output.
+/// Returns the process's exit code.
+int ExecuteTaskMain(const std::vector<std::unique_ptr<Executor>>& executors);
+
+}  // namespace vorocast::lease

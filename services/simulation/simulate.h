@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include "services/base/progress.h"
+#include "services/base/status.h"
+#include "services/geometry/simulated_take.h"
+
+namespace vorocast::simulation {
+
+/// Runs one effect on a tracked take, start to end (paper, section 5): each cell a convex rigid body in Bullet, recalled to its tracked
+/// pose by a damped spring, gravity, contacts, scene objects, rupture. The same input gives the same result on every run.
+/// INVALID_ARGUMENT for an effect that does not fit the schema.
+absl::StatusOr<geometry::SimulatedTake> Simulate(const geometry::TrackedTake& take, const nlohmann::json& effect, const base::Progress& progress);
+
+}  // namespace vorocast::simulation

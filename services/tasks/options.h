@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "services/base/status.h"
+
+/// The options of each kind of task. ToJson writes every field (so that defaults are part of the key); FromJson refuses an unknown
+/// field, a wrong type or a value out of range with INVALID_ARGUMENT naming the field and what it may hold.
+namespace vorocast::tasks {
+
+/// How a captured file's numbers become metres, y up.
+struct CaptureFrameOptions {
+  double metres_per_unit = 1;  // 0.01 for centimetres
+  std::string up = "+y";       // which axis of the file points up: one of +x -x +y -y +z -z
+};
+
+struct TessellateOptions {
+  CaptureFrameOptions capture;
+  std::int32_t cells = 5000;           // 1 … 200000
+  std::int32_t iterations = 10;        // L-BFGS iterations, 0 … 1000
+  std::string start = "lattice";       // "lattice": jittered BCC inside the shape; "random": uniform, as in the paper
+  std::string indicator = "spectral";  // "spectral": FFT Poisson; "cgal": CGAL's Poisson, the reference
+  std::uint64_t seed = 1;
+};
+
+/// A template is a tessellation of one frame with more iterations, and its patches.
+struct TemplateOptions {
+  TessellateOptions tessellate{.iterations = 50};
+  std::int32_t frame = 0;      // frame number it is made from, or −1: "choose": the frame whose cells have the largest surface
+  std::int32_t patches = 200;  // 1 … cells
+};
+
+struct GuideOptions {
+  std::int32_t points = 6000;  // surface points used a frame
+  std::int32_t iterations = 10;
+};
+
+struct TrackOptions {
+  std::int32_t iterations = 16;
+  double regulariser = 0.3;      // weight of the pose distance against unit data weights
+  double sigma_start_m = 0.020;  // soft-ICP scale, first and last iteration
+  double sigma_end_m = 0.005;
+  double normal_angle_max_deg = 45;  // θmax of the paper, section 4.3
+  double depth_tolerance_m = 0.015;  // ε of the paper, section 4.3
+  std::vector<std::int32_t> frames;  // the window's frame numbers, overlap included, ascending
+};
+
+struct AssembleOptions {
+  double frames_per_second = 25;
+  std::vector<std::int32_t> frames;    // every frame of the take, ascending
+  std::int32_t interpolated_max = 10;  // more missing frames than this in the take, and the task fails
+};
+
+struct SimulateOptions {
+  nlohmann::json effect;  // a whole effect (docs/effects.md), defaults filled in
+};
+
+struct SheetOptions {
+  std::string stage = "cells";  // "points", "cells", "tracked", "simulated"
+  std::int32_t pictures = 12;   // at most, spread evenly over the take
+  std::int32_t width = 480;     // of one picture, pixels
+  CaptureFrameOptions capture;  // for "points"
+};
+
+nlohmann::json ToJson(const TessellateOptions&);
+nlohmann::json ToJson(const TemplateOptions&);
+nlohmann::json ToJson(const GuideOptions&);
+nlohmann::json ToJson(const TrackOptions&);
+nlohmann::json ToJson(const AssembleOptions&);
+nlohmann::json ToJson(const SimulateOptions&);
+nlohmann::json ToJson(const SheetOptions&);
+
+absl::Status FromJson(const nlohmann::json&, TessellateOptions&);
+absl::Status FromJson(const nlohmann::json&, TemplateOptions&);
+absl::Status FromJson(const nlohmann::json&, GuideOptions&);
+absl::Status FromJson(const nlohmann::json&, TrackOptions&);
+absl::Status FromJson(const nlohmann::json&, AssembleOptions&);
+absl::Status FromJson(const nlohmann::json&, SimulateOptions&);
+absl::Status FromJson(const nlohmann::json&, SheetOptions&);
+
+}  // namespace vorocast::tasks

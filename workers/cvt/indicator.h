@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include "services/base/status.h"
+#include "services/geometry/oriented_points.h"
+#include "services/geometry/triangle_mesh.h"
+#include "workers/cvt/shape.h"
+
+namespace vorocast::cvt {
+
+enum class IndicatorMethod { kSpectral, kCgal };
+
+struct IndicatorOptions {
+  IndicatorMethod method = IndicatorMethod::kSpectral;
+  /// Grid spacing in metres; 0 chooses it from the points' density and extent (about 8 mm for a person), bounded by grid_nodes_max.
+  double spacing_m = 0;
+  std::int64_t grid_nodes_max = 8'000'000;
+  /// Gaussian that smooths the splatted normals, in grid cells.
+  double smoothing_cells = 0.5;
+
+  absl::Status Validate() const;
+};
+
+struct IndicatorSummary {
+  double spacing_m = 0;
+  double seconds_solve = 0;
+  double distance_mean_m = 0;              // of the input points to the surface
+  std::int64_t points_dropped_shells = 0;  // points whose shell was too small to keep
+};
+
+/// The shape that oriented points describe: a Poisson indicator (paper, section 3; Kazhdan 2006; spectral solve as in Peng 2021),
+/// isovalue at the points' mean, meshed closed. INVALID_ARGUMENT when the points cannot bound a volume, with the reason.
+absl::StatusOr<Shape> ShapeFromPoints(const geometry::OrientedPoints& points, const IndicatorOptions& options, IndicatorSummary* summary);
+
+/// The shape a closed mesh bounds. A mesh that is not closed, or crosses itself, is resampled to points and goes the way of points.
+absl::StatusOr<Shape> ShapeFromMesh(const geometry::TriangleMesh& mesh, const IndicatorOptions& options, IndicatorSummary* summary);
+
+}  // namespace vorocast::cvt

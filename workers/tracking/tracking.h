@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "services/base/progress.h"
+#include "services/base/status.h"
+#include "services/geometry/tracked_take.h"
+
+/// Volumetric tracking (paper, section 4; Allain et al. 2015): a template's patches follow incoherent observations through time.
+namespace vorocast::tracking {
+
+/// What was seen in one frame (paper, section 4.3): oriented surface points and the frame's own cells as inner points.
+struct Observation {
+  std::int32_t frame = 0;
+  bool missing = false;               // the frame could not be read or tessellated; its poses are interpolated
+  geometry::OrientedPoints surface;   // metres
+  std::vector<geometry::Vec3> inner;  // cell centroids
+  std::vector<double> inner_depth;    // [inner] distance to the surface, metres
+};
+
+/// k-medoids over the cell graph (paper, section 4.2): patch of each cell, 0 … count−1. Patches are connected and never span components;
+/// every component gets at least one. Deterministic in the seed.
+absl::StatusOr<std::vector<std::int32_t>> ClusterPatches(const geometry::Cells& cells, std::int32_t count, std::uint64_t seed);
+
+struct GuideOptions {
+  std::int32_t points = 6000;
+  std::int32_t iterations = 10;
+};
+
+/// A cheap pass through all frames, outward from the template's, that gives every window its start.
+absl::StatusOr<geometry::PoseTrack> Guide(const geometry::Template& model, const std::vector<Observation>& frames, const GuideOptions& options,
+                                          const base::Progress& progress);
+
+struct TrackOptions {
+  std::int32_t iterations = 16;
+  double regulariser = 0.3;
+  double sigma_start_m = 0.020;
+  double sigma_end_m = 0.005;
+  double normal_angle_max_deg = 45;  // θmax
+  double depth_tolerance_m = 0.015;  // ε
+
+  absl::Status Validate() const;
+};
+
+/// One window (paper, section 4.5): poses of all its frames and their mean pose, from the guide's start. `start` holds every frame of `window`.
+absl::StatusOr<geometry::PoseTrack> TrackWindow(const geometry::Template& model, const std::vector<Observation>& window,
+                                                const geometry::PoseTrack& start, const TrackOptions& options, const base::Progress& progress);
+
+struct AssembleOptions {
+  double frames_per_second = 25;
+  std::vector<std::int32_t> frames;
+  std::int32_t interpolated_max = 10;
+};
+
+/// Joins windows (overlaps blended), interpolates missing frames (marked), and blends patch transforms at the cells.
+absl::StatusOr<geometry::TrackedTake> Assemble(const geometry::Template& model, const std::vector<geometry::PoseTrack>& windows,
+                                               const AssembleOptions& options);
+
+/// Where material points given in the template frame are in each frame of a take: each follows the blended transforms of its cells. [F*points]
+std::vector<geometry::Vec3> CarryPoints(const geometry::TrackedTake& take, const std::vector<geometry::Vec3>& template_points);
+
+}  // namespace vorocast::tracking
