@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include <grpcpp/channel.h>
+
+namespace vorocast::rpc {
+
+/// A channel to "host:port" or "unix:/path", not yet connected. It finds out within five seconds that its peer has stopped answering and
+/// connects again by itself, at most a second after the peer is back. Never goes through a proxy.
+std::shared_ptr<grpc::Channel> Connect(const std::string& address);
+
+}  // namespace vorocast::rpc
