@@ -26,8 +26,8 @@ struct JobSpec {
   std::int32_t template_frame = -1;  // −1: chosen by the template task from the tessellated frames
   std::int32_t patches = 200;
   std::int32_t window_frames = 10;
-  std::int32_t overlap_frames = 3;  // frames that a window shares with the next
-  std::int32_t interpolated_max = 0;
+  std::int32_t overlap_frames = 3;    // frames that a window shares with the next
+  std::int32_t interpolated_max = 0;  // bad frames that are made up for; negative: a tenth of the take's frames
   double frames_per_second = 25;
   tasks::TrackOptions track;
   nlohmann::json effect;  // null: tracking only
@@ -53,14 +53,24 @@ struct PlannedTask {
 };
 
 /// The tasks that can be named from the frames known so far. `closed`: no frame will follow, so everything can be named.
-/// Calling it again with more frames returns a superset: the same names with the same content, in the same order.
+/// Calling it again with more frames returns a superset: the same names with the same content, in the same order. So the tasks of frames that
+/// have just arrived can be had by naming only those. The order is that in which a worker should take them.
+/// FAILED_PRECONDITION for a closed take without frames or without the template frame that the job names.
 absl::StatusOr<std::vector<PlannedTask>> Plan(const JobSpec& job, const std::vector<PlannedFrame>& frames, bool closed);
 
-/// The window [first, last) positions of each tracking window over `frame_count` frames.
+/// How many bad frames the job puts up with in a take of that many frames.
+std::int32_t InterpolatedMax(const JobSpec& job, std::int32_t frame_count);
+
+/// Every field, for the database; the options of FromJson's job are checked (INVALID_ARGUMENT names the field).
+nlohmann::json ToJson(const JobSpec& job);
+absl::StatusOr<JobSpec> JobSpecFromJson(const nlohmann::json& json);
+
+/// Positions [first, last) of one tracking window in the take.
 struct WindowRange {
   std::int32_t first = 0;
   std::int32_t last = 0;
 };
+/// Consecutive windows share `overlap_frames`; a last window with less than half of the usual new frames is merged into the one before.
 std::vector<WindowRange> SplitWindows(std::int32_t frame_count, std::int32_t window_frames, std::int32_t overlap_frames);
 
 }  // namespace vorocast::plan

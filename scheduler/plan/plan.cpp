@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "scheduler/plan/plan.h"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+namespace vorocast::plan {
+namespace {
+
+constexpr std::int32_t kTemplateIterations = 50;
+constexpr std::int32_t kSheetPictures = 12;
+constexpr std::string_view kTemplate = "template";
+constexpr std::string_view kGuide = "guide";
+constexpr std::string_view kAssemble = "assemble";
+
+std::string TessellateName(std::int32_t frame) { return fmt::format("frame {}: tessellate", frame); }
+
+std::string SimulateName(const nlohmann::json& effect) {
+  const auto name = effect.find("name");
+  return fmt::format("{}: simulate", name != effect.end() && name->is_string() ? name->get<std::string>() : "effect");
+}
+
+PlannedInput Blob(const PlannedFrame& frame) { return {.role = "frame", .frame = frame.number, .blob = frame.blob, .extension = frame.extension}; }
+
+PlannedInput Result(std::string role, std::string task) {
+  return {.role = std::move(role), .task = std::move(task), .extension = std::string(tasks::Extension(tasks::Kind::kTessellate))};
+}
+
+/// A frame that could not be tessellated is interpolated by those who read the others.
+PlannedInput CellsOf(const PlannedFrame& frame) {
+  PlannedInput input = Result("cells", TessellateName(frame.number));
+  input.frame = frame.number;
+  input.optional = true;
+  return input;
+}
+
+PlannedTask Tessellate(const JobSpec& job, const PlannedFrame& frame) {
+  return {.name = TessellateName(frame.number),
+          .kind = tasks::Kind::kTessellate,
+          .options = tasks::ToJson(job.tessellate),
+          .inputs = {Blob(frame)},
+          .output = fmt::format("cells/frame_{:06}.h5", frame.number)};
+}
+
+PlannedTask Template(const JobSpec& job, const std::vector<PlannedFrame>& frames) {
+  tasks::TemplateOptions options{.tessellate = job.tessellate, .frame = job.template_frame, .patches = job.patches};
+  options.tessellate.iterations = kTemplateIterations;
+  PlannedTask task{.name = std::string(kTemplate), .kind = tasks::Kind::kTemplate, .options = tasks::ToJson(options), .output = "template.h5"};
+  if (job.template_frame >= 0) {
+    for (const PlannedFrame& frame : frames) {
+      if (frame.number == job.template_frame) task.inputs.push_back(Blob(frame));
+    }
+  } else {
+    for (const PlannedFrame& frame : frames) task.inputs.push_back(Blob(frame));
+    for (const PlannedFrame& frame : frames) task.inputs.push_back(CellsOf(frame));
+  }
+  return task;
+}
+
+PlannedTask Guide(const std::vector<PlannedFrame>& frames) {
+  PlannedTask task{.name = std::string(kGuide), .kind = tasks::Kind::kGuide, .options = tasks::ToJson(tasks::GuideOptions{})};
+  task.inputs.push_back(Result("template", std::string(kTemplate)));
+  for (const PlannedFrame& frame : frames) task.inputs.push_back(CellsOf(frame));
+  return task;
+}
+
+PlannedTask Track(const JobSpec& job, const std::vector<PlannedFrame>& frames, WindowRange window) {
+  tasks::TrackOptions options = job.track;
+  options.frames.clear();
+  PlannedTask task{.kind = tasks::Kind::kTrack};
+  task.name = fmt::format("window {}-{}: track", frames[window.first].number, frames[window.last - 1].number);
+  task.inputs.push_back(Result("template", std::string(kTemplate)));
+  task.inputs.push_back(Result("guide", std::string(kGuide)));
+  for (std::int32_t i = window.first; i < window.last; ++i) {
+    options.frames.push_back(frames[i].number);
+    task.inputs.push_back(CellsOf(frames[i]));
+  }
+  task.options = tasks::ToJson(options);
+  return task;
+}
+
+PlannedTask Assemble(const JobSpec& job, const std::vector<PlannedFrame>& frames, const std::vector<PlannedTask>& windows) {
+  tasks::AssembleOptions options{.frames_per_second = job.frames_per_second,
+                                 .interpolated_max = InterpolatedMax(job, static_cast<std::int32_t>(frames.size()))};
+  for (const PlannedFrame& frame : frames) options.frames.push_back(frame.number);
+  PlannedTask task{.name = std::string(kAssemble), .kind = tasks::Kind::kAssemble, .options = tasks::ToJson(options), .output = "tracked.h5"};
+  task.inputs.push_back(Result("template", std::string(kTemplate)));
+  for (const PlannedTask& window : windows) task.inputs.push_back(Result("window", window.name));
+  return task;
+}
+
+PlannedTask Simulate(const JobSpec& job) {
+  return {.name = SimulateName(job.effect),
+          .kind = tasks::Kind::kSimulate,
+          .options = tasks::ToJson(tasks::SimulateOptions{.effect = job.effect}),
+          .inputs = {Result("tracked", std::string(kAssemble))},
+          .output = "simulated.h5"};
+}
+
+PlannedTask Sheet(const JobSpec& job, const std::string& stage, std::vector<PlannedInput> inputs) {
+  const tasks::SheetOptions options{.stage = stage, .pictures = kSheetPictures, .capture = job.tessellate.capture};
+  return {.name = fmt::format("{}: sheet", stage),
+          .kind = tasks::Kind::kSheet,
+          .options = tasks::ToJson(options),
+          .inputs = std::move(inputs),
+          .output = fmt::format("sheets/{}.png", stage)};
+}
+
+/// At most kSheetPictures frames, the first and the last among them, evenly between.
+std::vector<PlannedFrame> SheetFrames(const std::vector<PlannedFrame>& frames) {
+  if (frames.size() <= static_cast<std::size_t>(kSheetPictures)) return frames;
+  std::vector<PlannedFrame> chosen;
+  for (std::size_t i = 0; i < kSheetPictures; ++i) chosen.push_back(frames[i * (frames.size() - 1) / (kSheetPictures - 1)]);
+  return chosen;
+}
+
+std::vector<PlannedTask> Sheets(const JobSpec& job, const std::vector<PlannedFrame>& frames) {
+  std::vector<PlannedInput> points;
+  std::vector<PlannedInput> cells;
+  for (const PlannedFrame& frame : SheetFrames(frames)) {
+    points.push_back(Blob(frame));
+    cells.push_back(CellsOf(frame));
+  }
+  cells.push_back(Result("template", std::string(kTemplate)));
+  std::vector<PlannedTask> sheets;
+  sheets.push_back(Sheet(job, "points", std::move(points)));
+  sheets.push_back(Sheet(job, "cells", std::move(cells)));
+  sheets.push_back(Sheet(job, "tracked", {Result("tracked", std::string(kAssemble))}));
+  if (!job.effect.is_null()) {
+    sheets.push_back(Sheet(job, "simulated", {Result("simulated", SimulateName(job.effect)), Result("tracked", std::string(kAssemble))}));
+  }
+  return sheets;
+}
+
+absl::StatusOr<std::vector<PlannedFrame>> Ordered(std::vector<PlannedFrame> frames) {
+  std::sort(frames.begin(), frames.end(), [](const PlannedFrame& a, const PlannedFrame& b) { return a.number < b.number; });
+  for (std::size_t i = 1; i < frames.size(); ++i) {
+    if (frames[i - 1].number == frames[i].number) return absl::InvalidArgumentError(fmt::format("frame {} is in the take twice", frames[i].number));
+  }
+  return frames;
+}
+
+bool HasFrame(const std::vector<PlannedFrame>& frames, std::int32_t number) {
+  return std::any_of(frames.begin(), frames.end(), [number](const PlannedFrame& frame) { return frame.number == number; });
+}
+
+}  // namespace
+
+std::int32_t InterpolatedMax(const JobSpec& job, std::int32_t frame_count) {
+  return job.interpolated_max >= 0 ? job.interpolated_max : frame_count / 10;
+}
+
+absl::StatusOr<std::vector<PlannedTask>> Plan(const JobSpec& job, const std::vector<PlannedFrame>& unordered, bool closed) {
+  ASSIGN_OR_RETURN(const std::vector<PlannedFrame> frames, Ordered(unordered));
+  if (job.window_frames < 1 || job.overlap_frames < 0 || job.overlap_frames >= job.window_frames) {
+    return absl::InvalidArgumentError(fmt::format("windows of {} frames cannot share {} with the next", job.window_frames, job.overlap_frames));
+  }
+  if (closed && frames.empty()) return absl::FailedPreconditionError("the take was closed without a frame");
+  const bool template_known = job.template_frame >= 0 && HasFrame(frames, job.template_frame);
+  if (closed && job.template_frame >= 0 && !template_known) {
+    return absl::FailedPreconditionError(fmt::format("frame {} was asked for as the template, but the take has no such frame", job.template_frame));
+  }
+
+  std::vector<PlannedTask> planned;
+  if (template_known) planned.push_back(Template(job, frames));
+  for (const PlannedFrame& frame : frames) planned.push_back(Tessellate(job, frame));
+  if (!closed) return planned;
+
+  if (!template_known) planned.push_back(Template(job, frames));
+  planned.push_back(Guide(frames));
+  std::vector<PlannedTask> windows;
+  for (const WindowRange& window : SplitWindows(static_cast<std::int32_t>(frames.size()), job.window_frames, job.overlap_frames)) {
+    windows.push_back(Track(job, frames, window));
+  }
+  PlannedTask assemble = Assemble(job, frames, windows);
+  std::move(windows.begin(), windows.end(), std::back_inserter(planned));
+  planned.push_back(std::move(assemble));
+  if (!job.effect.is_null()) planned.push_back(Simulate(job));
+  if (job.sheets) {
+    for (PlannedTask& sheet : Sheets(job, frames)) planned.push_back(std::move(sheet));
+  }
+  return planned;
+}
+
+}  // namespace vorocast::plan
