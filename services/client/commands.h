@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+/// Each adds its subcommands to the program; a subcommand's callback sets `exit_code`.
+namespace vorocast::client {
+
+void AddRunCommands(CLI::App& program, int& exit_code);      // run, demo
+void AddServiceCommands(CLI::App& program, int& exit_code);  // serve, worker
+void AddJobCommands(CLI::App& program, int& exit_code);      // submit, status, watch, explain, cancel, retry, fetch
+void AddCaptureCommands(CLI::App& program, int& exit_code);  // inspect, synth
+
+}  // namespace vorocast::client

@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include <algorithm>
+#include <cstdlib>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "services/client/commands.h"
+#include "services/client/embedded_service.h"
+#include "services/client/interrupt.h"
+#include "services/client/job_flags.h"
+#include "services/client/job_view.h"
+#include "services/client/percent_view.h"
+#include "services/client/run_job.h"
+
+namespace vorocast::client {
+namespace {
+
+/// Which scheduler is meant: --to, else $VOROCAST_SCHEDULER, else the one that serves --state on this machine.
+struct SchedulerFlags {
+  std::string to, state;
+
+  void AddTo(CLI::App& command) {
+    command.add_option("--to", to, "Scheduler's address, HOST:PORT (VOROCAST_SCHEDULER, or the one serving --state here)")
+        ->envname("VOROCAST_SCHEDULER");
+    command.add_option("--state", state, "State folder of a scheduler on this machine (~/.cache/vorocast)");
+  }
+  absl::StatusOr<SchedulerClient> Connect() const {
+    if (!to.empty()) return SchedulerClient(to);
+    ASSIGN_OR_RETURN(const std::string address, RunningSchedulerAddress(state.empty() ? DefaultStateFolder() : std::filesystem::path(state)));
+    return SchedulerClient(address);
+  }
+};
+
+/// A job command's flags: the scheduler and a job, by default the newest.
+struct JobChoice {
+  SchedulerFlags scheduler;
+  std::string job_id;
+
+  void AddTo(CLI::App& command) {
+    command.add_option("job", job_id, "Job id as 'vorocast status' lists it (the newest)");
+    scheduler.AddTo(command);
+  }
+};
+
+using JobAction = std::function<absl::Status(SchedulerClient&, const std::string& job_id)>;
+
+absl::Status WithJob(const JobChoice& choice, const JobAction& action) {
+  ASSIGN_OR_RETURN(SchedulerClient client, choice.scheduler.Connect());
+  if (!choice.job_id.empty()) return action(client, choice.job_id);
+  ASSIGN_OR_RETURN(const std::vector<v1::Job> jobs, client.List(1));
+  if (jobs.empty()) return absl::NotFoundError(fmt::format("the scheduler at {} has no jobs; 'vorocast submit' makes one", client.address()));
+  return action(client, jobs.front().id());
+}
+
+void SetExitCode(int& exit_code, const absl::Status& status) { exit_code = status.ok() ? 0 : PrintError(status); }
+
+/// A command that does one thing with one job.
+CLI::App& AddJobCommand(CLI::App& program, int& exit_code, const std::string& name, const std::string& description, const JobAction& action) {
+  auto choice = std::make_shared<JobChoice>();
+  CLI::App& command = *program.add_subcommand(name, description);
+  choice->AddTo(command);
+  command.callback([choice, action, &exit_code] { SetExitCode(exit_code, WithJob(*choice, action)); });
+  return command;
+}
+
+void AddSubmit(CLI::App& program, int& exit_code) {
+  struct Flags {
+    std::string folder, session = "default";
+    CaptureFlags capture;
+    JobFlags job;
+    SchedulerFlags scheduler;
+    bool watch = false;
+  };
+  auto flags = std::make_shared<Flags>();
+  CLI::App& command = *program.add_subcommand("submit", "Send a capture to a running scheduler and ask for a job on it");
+  command.add_option("capture", flags->folder, "Folder with one file a frame: PLY, OBJ, OFF or Draco")->required();
+  command.add_option("--session", flags->session, "Recording day the take belongs to")->capture_default_str();
+  flags->capture.AddTo(command);
+  flags->job.AddTo(command);
+  flags->scheduler.AddTo(command);
+  command.add_flag("--watch", flags->watch, "Stay and show the job as it goes on");
+  command.footer("What the scheduler has already is not sent again: after a break, the same command goes on.");
+  command.callback([flags, &exit_code] {
+    const auto submit = [&]() -> absl::Status {
+      ASSIGN_OR_RETURN(const capture::CaptureOptions options, flags->capture.Parse());
+      ASSIGN_OR_RETURN(v1::SubmitJobRequest request, flags->job.Parse());
+      ASSIGN_OR_RETURN(const capture::Capture capture, capture::OpenCapture(flags->folder, options));
+      RETURN_IF_ERROR(CheckCapture(capture));
+      ASSIGN_OR_RETURN(SchedulerClient client, flags->scheduler.Connect());
+      PercentView view("Frames");
+      ASSIGN_OR_RETURN(const v1::Sequence sequence, client.Upload(capture, flags->session, [&](double fraction) { view.Show(fraction); }));
+      view.Finish();
+      request.set_sequence_id(sequence.id());
+      ASSIGN_OR_RETURN(const v1::Job job, client.Submit(request));
+      fmt::print("Job {}\n", job.id());
+      if (!flags->watch) return absl::OkStatus();
+      CatchInterrupts();
+      JobView job_view;
+      ASSIGN_OR_RETURN(const v1::Job last, client.Watch(
+                                               job.id(), [&](const v1::Job& now) { job_view.Show(now); }, Interrupted));
+      job_view.Finish(last);
+      return absl::OkStatus();
+    };
+    SetExitCode(exit_code, submit());
+  });
+}
+
+void AddStatus(CLI::App& program, int& exit_code) {
+  auto choice = std::make_shared<JobChoice>();
+  CLI::App& command = *program.add_subcommand("status", "List the jobs, or show one in full");
+  choice->AddTo(command);
+  command.callback([choice, &exit_code] {
+    const auto status = [&]() -> absl::Status {
+      ASSIGN_OR_RETURN(SchedulerClient client, choice->scheduler.Connect());
+      if (!choice->job_id.empty()) {
+        ASSIGN_OR_RETURN(const v1::Job job, client.Get(choice->job_id));
+        fmt::print("{}", DescribeJob(job));
+        return absl::OkStatus();
+      }
+      ASSIGN_OR_RETURN(const std::vector<v1::Job> jobs, client.List(50));
+      if (jobs.empty()) fmt::print("No jobs\n");
+      for (const v1::Job& job : jobs) fmt::print("{}  {:<24} {:<12} {}\n", job.id(), job.sequence_name(), job.user(), DescribeJobLine(job));
+      return absl::OkStatus();
+    };
+    SetExitCode(exit_code, status());
+  });
+}
+
+void AddExplain(CLI::App& program, int& exit_code) {
+  auto choice = std::make_shared<JobChoice>();
+  auto task = std::make_shared<std::string>();
+  CLI::App& command = *program.add_subcommand("explain", "Say in one sentence why a job or a task waits or failed");
+  choice->AddTo(command);
+  command.add_option("--task", *task, "A task's name, for example \"frame 12: tessellate\"");
+  command.callback([choice, task, &exit_code] {
+    SetExitCode(exit_code, WithJob(*choice, [&](SchedulerClient& client, const std::string& job_id) -> absl::Status {
+                  ASSIGN_OR_RETURN(const std::string text, client.Explain(job_id, *task));
+                  fmt::print("{}\n", text);
+                  return absl::OkStatus();
+                }));
+  });
+}
+
+void AddFetch(CLI::App& program, int& exit_code) {
+  auto choice = std::make_shared<JobChoice>();
+  auto out = std::make_shared<std::string>();
+  CLI::App& command = *program.add_subcommand("fetch", "Copy a job's results into a folder");
+  choice->AddTo(command);
+  command.add_option("--out", *out, "Folder for the results (vorocast-out/JOB)");
+  command.callback([choice, out, &exit_code] {
+    SetExitCode(exit_code, WithJob(*choice, [&](SchedulerClient& client, const std::string& job_id) -> absl::Status {
+                  CatchInterrupts();
+                  ASSIGN_OR_RETURN(const v1::Job job, client.Get(job_id));
+                  const std::filesystem::path folder = out->empty() ? std::filesystem::path("vorocast-out") / job_id : std::filesystem::path(*out);
+                  RETURN_IF_ERROR(FetchOutputs(client, job, folder));
+                  fmt::print("{} files in {}\n", job.outputs_size(), folder.string());
+                  return absl::OkStatus();
+                }));
+  });
+}
+
+}  // namespace
+
+void AddJobCommands(CLI::App& program, int& exit_code) {
+  AddSubmit(program, exit_code);
+  AddStatus(program, exit_code);
+  AddJobCommand(program, exit_code, "watch", "Show a job as it goes on, until it has ended",
+                [](SchedulerClient& client, const std::string& job_id) -> absl::Status {
+                  CatchInterrupts();
+                  JobView view;
+                  ASSIGN_OR_RETURN(const v1::Job job, client.Watch(
+                                                          job_id, [&](const v1::Job& now) { view.Show(now); }, Interrupted));
+                  view.Finish(job);
+                  return absl::OkStatus();
+                });
+  AddExplain(program, exit_code);
+  AddJobCommand(program, exit_code, "cancel", "Stop a job; what has finished stays",
+                [](SchedulerClient& client, const std::string& job_id) -> absl::Status {
+                  ASSIGN_OR_RETURN(const v1::Job job, client.Cancel(job_id));
+                  fmt::print("{}", DescribeJob(job));
+                  return absl::OkStatus();
+                });
+  AddJobCommand(program, exit_code, "retry", "Try a job's failed and cancelled tasks again",
+                [](SchedulerClient& client, const std::string& job_id) -> absl::Status {
+                  ASSIGN_OR_RETURN(const v1::Job job, client.Retry(job_id));
+                  fmt::print("{}", DescribeJob(job));
+                  return absl::OkStatus();
+                });
+  AddFetch(program, exit_code);
+}
+
+}  // namespace vorocast::client

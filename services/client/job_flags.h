@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "proto/jobs.pb.h"
+#include "services/base/status.h"
+#include "services/capture/capture.h"
+
+namespace vorocast::client {
+
+/// --units, --up, --fps, --name, --frames, --components: what a capture's numbers mean.
+struct CaptureFlags {
+  std::string units, up, name, frames;
+  double frames_per_second = 0;
+  std::int32_t components = 0;
+
+  void AddTo(CLI::App& command);
+  absl::StatusOr<capture::CaptureOptions> Parse() const;
+};
+
+/// --cells, --iterations, --patches, --template, --window, --effect, …: what is to be computed.
+struct JobFlags {
+  std::int32_t cells = 5000, iterations = 10, patches = 0, window = 10, bad_frames_max = -1, priority = 0;
+  std::string template_frame = "auto", effect, indicator = "spectral", start = "lattice";
+  bool no_sheets = false;
+
+  void AddTo(CLI::App& command);
+  /// Everything but the sequence. The effect is read and checked here, so that a mistake in it is told before anything is sent.
+  absl::StatusOr<v1::SubmitJobRequest> Parse() const;
+};
+
+/// "12:40" is frames 12 … 39, ":60" the first sixty, "100:" all from the hundredth. INVALID_ARGUMENT otherwise.
+absl::Status ParseFrameRange(const std::string& text, capture::CaptureOptions& options);
+
+}  // namespace vorocast::client

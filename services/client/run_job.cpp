@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "services/client/run_job.h"
+
+#include <chrono>
+#include <cstdio>
+#include <thread>
+
+#include <fmt/format.h>
+
+#include "services/base/digest.h"
+#include "services/capture/frame_reader.h"
+#include "services/client/embedded_service.h"
+#include "services/client/interrupt.h"
+#include "services/client/job_view.h"
+#include "services/client/percent_view.h"
+
+namespace vorocast::client {
+namespace {
+
+/// So many times in a row the scheduler may be unreachable before the client gives up.
+constexpr int kReconnectsMax = 20;
+constexpr auto kReconnectPause = std::chrono::milliseconds(250);
+
+/// Runs share one state folder, and the same folder of frames may be run with other flags or in part; each gets a sequence of its own.
+std::string SessionOf(const capture::Capture& capture) {
+  base::Hasher hasher;
+  hasher.UpdateField(fmt::format("{} {} {}", capture.frames_per_second, capture.metres_per_unit, capture.up));
+  for (const capture::CaptureFrame& frame : capture.frames) {
+    std::error_code error;
+    const auto size = std::filesystem::file_size(frame.path, error);
+    const auto time = std::filesystem::last_write_time(frame.path, error).time_since_epoch().count();
+    hasher.UpdateField(fmt::format("{} {} {} {}", std::filesystem::absolute(frame.path).string(), frame.number, error ? 0 : size, time));
+  }
+  return "run-" + hasher.Finish().Short();
+}
+
+absl::Status InterruptedStatus() { return absl::CancelledError("stopped; the same command goes on from here"); }
+
+/// Submits the job and follows it to its end; when the scheduler dies on the way, starts it again and goes on.
+absl::StatusOr<v1::Job> FollowJob(EmbeddedService& service, std::unique_ptr<SchedulerClient>& client, const v1::SubmitJobRequest& request) {
+  JobView view;
+  std::string job_id;
+  int reconnects = 0;
+  while (true) {
+    absl::StatusOr<v1::Job> job = client->Submit(request);
+    if (job.ok() && (job->state() == v1::FAILED || job->state() == v1::CANCELLED)) job = client->Retry(job->id());
+    if (job.ok()) {
+      job_id = job->id();
+      job = client->Watch(
+          job_id,
+          [&](const v1::Job& now) {
+            reconnects = 0;
+            view.Show(now);
+          },
+          Interrupted);
+    }
+    if (Interrupted()) {
+      if (!job_id.empty()) (void)client->Cancel(job_id);
+      return InterruptedStatus();
+    }
+    if (job.ok() && HasEnded(*job)) {
+      view.Finish(*job);
+      return job;
+    }
+    if (!job.ok() && !absl::IsUnavailable(job.status()) && !absl::IsDeadlineExceeded(job.status())) return job.status();
+    if (++reconnects > kReconnectsMax) return job.ok() ? absl::UnavailableError("the scheduler ended the stream again and again") : job.status();
+    if (reconnects == 1) view.Say("The scheduler is away; starting it again. Nothing finished is lost.");
+    std::this_thread::sleep_for(kReconnectPause);
+    RETURN_IF_ERROR(service.Ensure());
+    client = std::make_unique<SchedulerClient>(service.address());
+  }
+}
+
+void PrintResults(const v1::Job& job, const std::filesystem::path& out, double seconds) {
+  fmt::print("\n{} frames in {} at {}\n", job.sequence_name(), FormatDuration(seconds), out.string());
+  for (const v1::Output& output : job.outputs()) {
+    if (!output.name().starts_with("cells/")) fmt::print("  {:<24} {:>8.1f} MB\n", output.name(), static_cast<double>(output.size()) / 1e6);
+  }
+  const auto cells = std::ranges::count_if(job.outputs(), [](const v1::Output& output) { return output.name().starts_with("cells/"); });
+  if (cells > 0) fmt::print("  {:<24} {} frames\n", "cells/", cells);
+}
+
+}  // namespace
+
+int PrintError(const absl::Status& status) {
+  fmt::print(stderr, "vorocast: error: {}\n", std::string(status.message()));
+  return absl::IsInvalidArgument(status) || absl::IsNotFound(status) || absl::IsAlreadyExists(status) ? 2 : 1;
+}
+
+absl::Status CheckCapture(const capture::Capture& capture) {
+  capture::FrameReadOptions options;
+  options.metres_per_unit = capture.metres_per_unit;
+  options.up = capture.up;
+  absl::Status first_error;
+  for (const std::size_t i : {std::size_t{0}, capture.frames.size() / 2, capture.frames.size() - 1}) {
+    const auto frame = capture::ReadFrame(capture.frames[i].path, options);
+    if (frame.ok()) {
+      geometry::Box3 box;
+      for (const auto& p : frame->points.positions) box.extend(p);
+      fmt::print("{}: {} frames at {:g} a second, {:.2f} m tall{}\n", capture.name, capture.frames.size(), capture.frames_per_second, box.sizes().y(),
+                 frame->notes.normals_estimated ? ", normals estimated" : "");
+      return absl::OkStatus();
+    }
+    if (first_error.ok()) first_error = frame.status();
+  }
+  return first_error;
+}
+
+absl::Status FetchOutputs(SchedulerClient& client, const v1::Job& job, const std::filesystem::path& folder) {
+  PercentView view("Results");
+  double total = 1, fetched = 0;
+  for (const v1::Output& output : job.outputs()) total += static_cast<double>(output.size());
+  for (const v1::Output& output : job.outputs()) {
+    if (Interrupted()) return InterruptedStatus();
+    RETURN_IF_ERROR(client.Fetch(job.id(), output, folder / output.name()));
+    view.Show((fetched += static_cast<double>(output.size())) / total);
+  }
+  return absl::OkStatus();
+}
+
+int RunJob(const capture::Capture& capture, v1::SubmitJobRequest request, const RunOptions& options) {
+  const auto started = std::chrono::steady_clock::now();
+  if (const absl::Status status = CheckCapture(capture); !status.ok()) return PrintError(status);
+  CatchInterrupts();
+
+  fmt::print("State folder: {}\n", options.state.string());
+  auto service = EmbeddedService::Start({options.state, options.workers});
+  if (!service.ok()) return PrintError(service.status());
+  auto client = std::make_unique<SchedulerClient>(service->address());
+
+  PercentView upload_view("Frames");
+  const auto sequence = client->Upload(capture, SessionOf(capture), [&](double fraction) { upload_view.Show(fraction); });
+  if (!sequence.ok()) return PrintError(sequence.status());
+  upload_view.Finish();
+
+  request.set_sequence_id(sequence->id());
+  const auto job = FollowJob(*service, client, request);
+  if (!job.ok()) return PrintError(job.status());
+
+  const absl::Status fetched = FetchOutputs(*client, *job, options.out);
+  if (!fetched.ok()) return PrintError(fetched);
+  PrintResults(*job, std::filesystem::absolute(options.out).lexically_normal(),
+               std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count());
+  return job->state() == v1::DONE ? 0 : 1;
+}
+
+}  // namespace vorocast::client

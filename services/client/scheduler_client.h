@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "proto/capture.grpc.pb.h"
+#include "proto/jobs.grpc.pb.h"
+#include "services/base/progress.h"
+#include "services/base/status.h"
+#include "services/capture/capture.h"
+
+namespace vorocast::client {
+
+/// What a client asks of a scheduler, as plain calls. Every call has a deadline, except those that stream until the job has ended.
+class SchedulerClient {
+ public:
+  explicit SchedulerClient(const std::string& address);
+
+  const std::string& address() const { return address_; }
+
+  /// Opens the capture's sequence, sends what the store does not have yet, adds all frames and closes it. May be repeated.
+  absl::StatusOr<v1::Sequence> Upload(const capture::Capture& capture, const std::string& session, const base::Progress& progress);
+
+  absl::StatusOr<v1::Job> Submit(const v1::SubmitJobRequest& request);
+  absl::StatusOr<v1::Job> Get(const std::string& job_id);
+  absl::StatusOr<std::vector<v1::Job>> List(std::int32_t limit);
+  absl::StatusOr<v1::Job> Cancel(const std::string& job_id);
+  absl::StatusOr<v1::Job> Retry(const std::string& job_id);
+  absl::StatusOr<std::string> Explain(const std::string& job_id, const std::string& task);
+
+  /// Calls `seen` with the job now and after each change until it has ended; returns its last state. Asks `interrupted` ten times a second
+  /// and ends with CANCELLED once that says true.
+  absl::StatusOr<v1::Job> Watch(const std::string& job_id, const std::function<void(const v1::Job&)>& seen, const std::function<bool()>& interrupted);
+
+  /// Writes one result to `path` under a temporary name, checks its digest, renames. Does nothing when `path` holds it already.
+  absl::Status Fetch(const std::string& job_id, const v1::Output& output, const std::filesystem::path& path);
+
+ private:
+  absl::Status UploadBlob(const v1::Blob& blob, const std::filesystem::path& path);
+
+  std::string address_;
+  std::unique_ptr<v1::Captures::Stub> captures_;
+  std::unique_ptr<v1::Jobs::Stub> jobs_;
+};
+
+}  // namespace vorocast::client
