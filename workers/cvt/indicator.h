@@ -23,9 +23,10 @@ struct IndicatorOptions {
 
 struct IndicatorSummary {
   double spacing_m = 0;
-  double seconds_solve = 0;
-  double distance_mean_m = 0;              // of the input points to the surface
-  std::int64_t points_dropped_shells = 0;  // points whose shell was too small to keep
+  double seconds_solve = 0;                // CPU time of the Poisson solve alone
+  double distance_mean_m = 0;              // of the input points to the surface; a point farther than 5 spacings counts as 5
+  std::int64_t points_dropped_shells = 0;  // points whose shell was too small or too little supported to keep
+  std::int64_t points_far = 0;             // points more than 2 spacings from the surface: on parts too thin for the grid, or stray
 };
 
 /// The shape that oriented points describe: a Poisson indicator (paper, section 3; Kazhdan 2006; spectral solve as in Peng 2021),
