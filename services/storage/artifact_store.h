@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string_view>
+#include <utility>
 
+#include "absl/time/time.h"
 #include "services/base/digest.h"
 #include "services/base/status.h"
 
@@ -30,6 +33,10 @@ class ArtifactStore {
   absl::Status PublishArtifact(const std::filesystem::path& temporary, const base::Digest& key, std::string_view extension) const;
   /// The same for a blob; refuses (DATA_LOSS) bytes that do not have the digest.
   absl::Status PublishBlob(const std::filesystem::path& temporary, const base::Digest& digest, std::string_view extension) const;
+
+  /// Removes files under tmp/ whose writer, a process of this machine, has died; younger ones than `minimum_age` are left, in case process
+  /// numbers mean something else in another container of the same host name. Returns how many were removed.
+  std::int64_t RemoveStaleTemporaries(absl::Duration minimum_age) const;
 
   const std::filesystem::path& root() const { return root_; }
 

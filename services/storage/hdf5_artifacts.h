@@ -26,6 +26,23 @@ struct Provenance {
 absl::Status WriteCells(const std::filesystem::path& path, const geometry::Cells& cells, const Provenance& provenance);
 absl::StatusOr<geometry::Cells> ReadCells(const std::filesystem::path& path);
 
+/// The head of a cells.h5, without its arrays.
+struct CellsSummary {
+  double energy = 0;        // m⁵
+  double surface_area = 0;  // m²
+  std::int32_t iterations = 0;
+  std::int64_t cell_count = 0;
+};
+absl::StatusOr<CellsSummary> ReadCellsSummary(const std::filesystem::path& path);
+
+/// The part of a cells.h5 that tracking looks at: a third of the file.
+struct ObservedCells {
+  geometry::OrientedPoints surface;
+  std::vector<geometry::Vec3> centroid;  // [n]
+  std::vector<double> depth;             // [n] metres
+};
+absl::StatusOr<ObservedCells> ReadObservedCells(const std::filesystem::path& path);
+
 /// template.h5: the cells layout, /patch [n] i4, root attribute frame.
 absl::Status WriteTemplate(const std::filesystem::path& path, const geometry::Template& model, const Provenance& provenance);
 absl::StatusOr<geometry::Template> ReadTemplate(const std::filesystem::path& path);
