@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
+#include <functional>
+
 #include <nlohmann/json.hpp>
 
 #include "services/base/progress.h"
@@ -9,9 +11,13 @@
 
 namespace vorocast::simulation {
 
+/// Asked at every stored frame; true ends the run with CANCELLED.
+using Cancelled = std::function<bool()>;
+
 /// Runs one effect on a tracked take, start to end (paper, section 5): each cell a convex rigid body in Bullet, recalled to its tracked
 /// pose by a damped spring, gravity, contacts, scene objects, rupture. The same input gives the same result on every run.
-/// INVALID_ARGUMENT for an effect that does not fit the schema.
-absl::StatusOr<geometry::SimulatedTake> Simulate(const geometry::TrackedTake& take, const nlohmann::json& effect, const base::Progress& progress);
+/// INVALID_ARGUMENT for an effect that does not fit the schema, or a take whose arrays do not fit each other.
+absl::StatusOr<geometry::SimulatedTake> Simulate(const geometry::TrackedTake& take, const nlohmann::json& effect, const base::Progress& progress,
+                                                 const Cancelled& cancelled = {});
 
 }  // namespace vorocast::simulation

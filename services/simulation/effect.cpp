@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "services/simulation/effect.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "services/base/check.h"
+#include "services/simulation/effect_settings.h"
+#include "services/simulation/json_schema.h"
+#include "services/simulation/shipped_effects.h"
+
+namespace vorocast::simulation {
+namespace {
+
+using nlohmann::json;
+
+constexpr std::uintmax_t kLargestFile = 1 << 20;
+
+absl::StatusOr<std::string> ReadText(const std::filesystem::path& path) {
+  std::error_code error;
+  const std::uintmax_t size = std::filesystem::file_size(path, error);
+  if (error) return absl::NotFoundError(fmt::format("effect file {}: {}", path.string(), error.message()));
+  if (size > kLargestFile) return absl::InvalidArgumentError(fmt::format("effect file {}: {} bytes, an effect has at most {}", path.string(), size, kLargestFile));
+  std::ifstream file(path, std::ios::binary);
+  std::string text{std::istreambuf_iterator<char>(file), {}};
+  if (!file) return absl::UnavailableError(fmt::format("effect file {}: cannot be read", path.string()));
+  return text;
+}
+
+}  // namespace
+
+std::vector<std::string> ShippedEffects() {
+  std::vector<std::string> names;
+  for (const EmbeddedFile& effect : EmbeddedEffects()) names.emplace_back(effect.name);
+  return names;
+}
+
+absl::StatusOr<json> NormaliseEffect(const json& effect) {
+  static const json schema = json::parse(EffectSchemaText());
+  ASSIGN_OR_RETURN(json canonical, Canonicalise(schema, effect, "effect"));
+  RETURN_IF_ERROR(EffectFromCanonicalJson(canonical).status());
+  return canonical;
+}
+
+absl::StatusOr<json> ParseEffect(std::string_view text) {
+  if (text.size() > kLargestFile) return absl::InvalidArgumentError(fmt::format("effect: {} bytes, an effect has at most {}", text.size(), kLargestFile));
+  json effect;
+  try {
+    effect = json::parse(text);
+  } catch (const json::exception& error) {
+    return absl::InvalidArgumentError(fmt::format("effect: not valid JSON: {}", error.what()));
+  }
+  return NormaliseEffect(effect);
+}
+
+absl::StatusOr<json> LoadEffect(const std::string& name_or_path) {
+  for (const EmbeddedFile& effect : EmbeddedEffects()) {
+    if (effect.name == name_or_path) return ParseEffect(effect.text);
+  }
+  std::error_code error;
+  if (!std::filesystem::exists(name_or_path, error)) {
+    return absl::NotFoundError(fmt::format("effect \"{}\": no such file, and none of the shipped effects ({})", name_or_path, fmt::join(ShippedEffects(), ", ")));
+  }
+  ASSIGN_OR_RETURN(const std::string text, ReadText(name_or_path));
+  auto effect = ParseEffect(text);
+  if (!effect.ok()) return base::Annotate(effect.status(), name_or_path);
+  return effect;
+}
+
+}  // namespace vorocast::simulation

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "services/base/status.h"
+#include "services/geometry/vector.h"
+
+/// A whole effect in types. Every member is a field of effects/effect.schema.json, whose descriptions hold; what the file writes as a
+/// word ("take", "auto", "lowest", "never") is an empty optional here.
+namespace vorocast::simulation {
+
+struct Surface {
+  double friction = 0.7;
+  double restitution = 0.1;
+};
+
+struct GroundSettings {
+  bool enabled = true;
+  std::optional<double> height_m;
+  Surface surface;
+};
+
+struct RecallSettings {
+  double stiffness_s2 = 1000;
+  double damping_ratio = 1;
+  double angular_stiffness_s2 = 1000;
+  double angular_damping_ratio = 1;
+};
+
+struct CellSettings {
+  double density_kg_m3 = 1000;
+  double shrink_m = 0.0003;
+  Surface surface;
+};
+
+struct ReleaseByHeight {
+  bool from_top = true;
+  double start_s = 0;
+  double end_s = 1;
+  double share = 1;
+};
+
+/// What a box and a sphere have in common.
+struct Placement {
+  std::string name;
+  geometry::Vec3 position_m = geometry::Vec3::Zero();
+  bool origin_is_take = true;
+  bool fixed = false;
+  double mass_kg = 50;
+  geometry::Vec3 velocity_m_s = geometry::Vec3::Zero();
+  double start_s = 0;
+  Surface surface;
+};
+
+struct BoxSettings {
+  Placement placement;
+  geometry::Vec3 size_m = geometry::Vec3::Constant(0.3);
+  geometry::Vec3 rotation_deg = geometry::Vec3::Zero();
+};
+
+struct SphereSettings {
+  Placement placement;
+  double radius_m = 0.15;
+};
+
+struct PendulumSettings {
+  std::string name;
+  double radius_m = 0.12;
+  double arm_m = 2.5;
+  std::optional<geometry::Vec3> pivot_m;
+  bool origin_is_take = true;
+  std::optional<double> heading_deg;
+  double start_angle_deg = 60;
+  double hit_time_s = 1;
+  double hit_height = 0.7;
+  bool driven = true;
+  double mass_kg = 50;
+  Surface surface;
+};
+
+using ObjectSettings = std::variant<BoxSettings, SphereSettings, PendulumSettings>;
+
+struct Effect {
+  std::string name;
+  std::string description;
+  std::optional<double> duration_s;
+  std::optional<double> output_fps;
+  double rate_hz = 240;
+  double gravity_m_s2 = 9.81;
+  GroundSettings ground;
+  RecallSettings recall;
+  std::optional<double> rupture_acceleration_m_s2;
+  std::vector<ReleaseByHeight> release;
+  CellSettings cells;
+  std::vector<ObjectSettings> objects;
+};
+
+/// The typed form of canonical JSON (what NormaliseEffect returns). INVALID_ARGUMENT for what no single field shows to be wrong: a
+/// release that ends before it starts, two objects of one name.
+/// Every field of the schema is read here and nothing else: that both know the same fields is checked.
+absl::StatusOr<Effect> EffectFromCanonicalJson(const nlohmann::json& effect);
+
+}  // namespace vorocast::simulation

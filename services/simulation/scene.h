@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "services/base/status.h"
+#include "services/geometry/simulated_take.h"
+#include "services/simulation/cell_shapes.h"
+#include "services/simulation/effect_settings.h"
+#include "services/simulation/pendulum.h"
+#include "services/simulation/recall.h"
+#include "services/simulation/tracked_motion.h"
+
+namespace vorocast::simulation {
+
+/// A scene object with its place worked out. Its body is a ball or a box about the body's origin; what is drawn has its own frame.
+struct SceneBody {
+  enum class Motion : std::uint8_t {
+    kFixed,   // never moves
+    kLoose,   // held until start_s, then moves by physics from `start`
+    kDriven,  // follows `swing` whatever it hits
+  };
+  std::string name;
+  Motion motion = Motion::kLoose;
+  std::optional<geometry::Vec3> box_half;  // metres; empty for a ball
+  double radius = 0;                       // of the ball
+  double mass = 1;                         // kg
+  Surface surface;
+  BodyState start;
+  double start_s = 0;
+
+  geometry::Rigid3 body_from_object;  // object: the frame of `mesh` and of the stored poses
+  geometry::TriangleMesh mesh;
+
+  // Pendulums only.
+  struct Hinge {
+    geometry::Rigid3 world_from_pivot;  // x: where the ball goes at its first passage; y up; it turns about z
+    double arm = 0;
+    PendulumSwing swing;
+  };
+  std::optional<Hinge> hinge;
+
+  /// Where a driven body is at `time`.
+  geometry::Rigid3 DrivenPose(double time) const;
+};
+
+struct Scene {
+  std::optional<double> ground_height;
+  std::vector<SceneBody> bodies;
+};
+
+/// Places ground and objects for a take. INVALID_ARGUMENT for a pendulum without gravity.
+absl::StatusOr<Scene> MakeScene(const Effect& effect, const geometry::Cells& cells, const TrackedMotion& motion);
+
+/// The lowest point that any cell's corner reaches at any frame, metres.
+double LowestPoint(const geometry::Cells& cells, const TrackedMotion& motion);
+
+}  // namespace vorocast::simulation

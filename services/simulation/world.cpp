@@ -1,0 +1,234 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "services/simulation/world.h"
+
+#include <BulletDynamics/ConstraintSolver/btHingeConstraint.h>
+#include <btBulletDynamicsCommon.h>
+
+#include "services/base/check.h"
+
+namespace vorocast::simulation {
+namespace {
+
+using geometry::Quat;
+using geometry::Rigid3;
+using geometry::Vec3;
+
+constexpr double kUnits = 100;  // Bullet units (centimetres) a metre
+constexpr int kSolverIterations = 5;
+constexpr float kAngularDamping = 0.2F;  // of released cells, so that a pile comes to rest
+constexpr float kSleepSpeed = 4;         // centimetres a second
+constexpr float kSleepTurn = 1;          // radians a second
+
+enum Group : int { kGround = 1, kRecalledCell = 2, kReleasedCell = 4, kObject = 8 };
+
+btVector3 ToBullet(const Vec3& v) { return {static_cast<float>(v.x()), static_cast<float>(v.y()), static_cast<float>(v.z())}; }
+btVector3 LengthToBullet(const Vec3& v) { return ToBullet(kUnits * v); }
+Vec3 FromBullet(const btVector3& v) { return {v.x(), v.y(), v.z()}; }
+btQuaternion ToBullet(const Quat& q) {
+  return {static_cast<float>(q.x()), static_cast<float>(q.y()), static_cast<float>(q.z()), static_cast<float>(q.w())};
+}
+btTransform ToBullet(const Vec3& position, const Quat& rotation) { return btTransform(ToBullet(rotation), LengthToBullet(position)); }
+
+/// Body frame to cell frame and back: `cell_from_body` has no translation.
+BodyState StateOf(const btRigidBody& body, const Quat& cell_from_body) {
+  const btQuaternion q = body.getOrientation();
+  const Quat world_from_body = Quat(q.w(), q.x(), q.y(), q.z()).normalized();
+  return {.position = FromBullet(body.getWorldTransform().getOrigin()) / kUnits,
+          .rotation = world_from_body * cell_from_body.conjugate(),
+          .velocity = FromBullet(body.getLinearVelocity()) / kUnits,
+          .angular_velocity = FromBullet(body.getAngularVelocity())};
+}
+
+void PlaceBody(btRigidBody& body, const BodyState& state, const Quat& cell_from_body) {
+  const btTransform pose = ToBullet(state.position, state.rotation * cell_from_body);
+  body.setWorldTransform(pose);
+  body.setInterpolationWorldTransform(pose);
+  body.setLinearVelocity(LengthToBullet(state.velocity));
+  body.setAngularVelocity(ToBullet(state.angular_velocity));
+  body.setInterpolationLinearVelocity(body.getLinearVelocity());
+  body.setInterpolationAngularVelocity(body.getAngularVelocity());
+}
+
+void SetSurface(btRigidBody& body, const Surface& surface) {
+  body.setFriction(static_cast<float>(surface.friction));
+  body.setRestitution(static_cast<float>(surface.restitution));
+}
+
+struct CellBody {
+  std::unique_ptr<btConvexHullShape> shape;
+  std::unique_ptr<btRigidBody> body;
+  Quat cell_from_body;
+  bool inside = false;
+};
+
+struct ObjectBody {
+  std::unique_ptr<btCollisionShape> shape;
+  std::unique_ptr<btRigidBody> body;
+  std::unique_ptr<btHingeConstraint> hinge;
+  double mass = 0;
+  double arm = 0;  // of a pendulum, metres
+  bool driven = false;
+  BodyState start;
+};
+
+}  // namespace
+
+struct World::Bodies {
+  btDefaultCollisionConfiguration configuration;
+  btCollisionDispatcher dispatcher{&configuration};
+  btDbvtBroadphase broadphase;
+  btSequentialImpulseConstraintSolver solver;
+  btDiscreteDynamicsWorld world{&dispatcher, &broadphase, &solver, &configuration};
+  std::unique_ptr<btStaticPlaneShape> ground_shape;
+  std::unique_ptr<btRigidBody> ground;
+  std::vector<CellBody> cells;
+  std::vector<ObjectBody> objects;
+  btVector3 gravity{0, 0, 0};
+
+  ~Bodies() {
+    for (ObjectBody& object : objects) {
+      if (object.hinge) world.removeConstraint(object.hinge.get());
+      world.removeRigidBody(object.body.get());
+    }
+    for (CellBody& cell : cells) {
+      if (cell.inside) world.removeRigidBody(cell.body.get());
+    }
+    if (ground) world.removeRigidBody(ground.get());
+  }
+};
+
+World::World(double gravity, std::optional<double> ground_height, const Surface& ground) : bodies_(std::make_unique<Bodies>()) {
+  Bodies& b = *bodies_;
+  b.gravity = LengthToBullet(Vec3(0, -gravity, 0));
+  b.world.setGravity(b.gravity);
+  b.world.setForceUpdateAllAabbs(false);
+  b.world.getDispatchInfo().m_useContinuous = false;
+  b.world.getDispatchInfo().m_deterministicOverlappingPairs = true;
+  b.world.getSolverInfo().m_numIterations = kSolverIterations;
+  b.solver.setRandSeed(0);
+  if (!ground_height) return;
+  b.ground_shape = std::make_unique<btStaticPlaneShape>(btVector3(0, 1, 0), static_cast<float>(kUnits * *ground_height));
+  b.ground = std::make_unique<btRigidBody>(btRigidBody::btRigidBodyConstructionInfo(0, nullptr, b.ground_shape.get()));
+  SetSurface(*b.ground, ground);
+  b.world.addRigidBody(b.ground.get(), kGround, kReleasedCell | kObject);
+}
+
+World::~World() = default;
+
+void World::AddCells(const std::vector<CellShape>& shapes, const Surface& surface) {
+  for (const CellShape& shape : shapes) {
+    CellBody cell;
+    cell.cell_from_body = shape.cell_from_body;
+    cell.shape = std::make_unique<btConvexHullShape>();
+    for (const Vec3& corner : shape.hull) cell.shape->addPoint(LengthToBullet(corner), false);
+    cell.shape->setMargin(static_cast<float>(kUnits * kHullMargin));
+    cell.shape->recalcLocalAabb();
+    btRigidBody::btRigidBodyConstructionInfo info(static_cast<float>(shape.mass), nullptr, cell.shape.get(), ToBullet(kUnits * kUnits * shape.inertia));
+    cell.body = std::make_unique<btRigidBody>(info);
+    // Gyroscopic torque is nothing to see on lumps, and a recalled cell's rotation is not Bullet's to change.
+    cell.body->setFlags(BT_DISABLE_WORLD_GRAVITY);
+    cell.body->setSleepingThresholds(kSleepSpeed, kSleepTurn);
+    SetSurface(*cell.body, surface);
+    bodies_->cells.push_back(std::move(cell));
+  }
+}
+
+void World::AddObject(const SceneBody& scene_body) {
+  ObjectBody object;
+  object.mass = scene_body.mass;
+  object.arm = scene_body.hinge ? scene_body.hinge->arm : 0;
+  object.start = scene_body.start;
+  object.driven = scene_body.motion == SceneBody::Motion::kDriven;
+  if (scene_body.box_half) {
+    auto box = std::make_unique<btBoxShape>(LengthToBullet(*scene_body.box_half));
+    box->setMargin(static_cast<float>(kUnits * kHullMargin));
+    object.shape = std::move(box);
+  } else {
+    object.shape = std::make_unique<btSphereShape>(static_cast<float>(kUnits * scene_body.radius));
+  }
+  // Held objects and fixed ones have no mass until they are let go.
+  object.body = std::make_unique<btRigidBody>(btRigidBody::btRigidBodyConstructionInfo(0, nullptr, object.shape.get()));
+  PlaceBody(*object.body, {.position = object.start.position, .rotation = object.start.rotation}, Quat::Identity());
+  object.body->setDamping(0, 0);
+  SetSurface(*object.body, scene_body.surface);
+  if (object.driven) {
+    object.body->setCollisionFlags(object.body->getCollisionFlags() | btCollisionObject::CF_KINEMATIC_OBJECT);
+    object.body->setActivationState(DISABLE_DEACTIVATION);
+  }
+  bodies_->world.addRigidBody(object.body.get(), kObject, kGround | kRecalledCell | kReleasedCell | kObject);
+  bodies_->objects.push_back(std::move(object));
+}
+
+void World::Enter(std::size_t index, Role role, const BodyState& state) {
+  CellBody& cell = bodies_->cells[index];
+  if (cell.inside) bodies_->world.removeRigidBody(cell.body.get());
+  cell.inside = true;
+  PlaceBody(*cell.body, state, cell.cell_from_body);
+  cell.body->clearForces();
+  const bool recalled = role == Role::kRecalled;
+  cell.body->setDamping(0, recalled ? 0 : kAngularDamping);
+  cell.body->setGravity(recalled ? btVector3(0, 0, 0) : bodies_->gravity);
+  cell.body->forceActivationState(recalled ? DISABLE_DEACTIVATION : ACTIVE_TAG);
+  cell.body->setDeactivationTime(0);
+  const int others = recalled ? kReleasedCell | kObject : kGround | kRecalledCell | kReleasedCell | kObject;
+  bodies_->world.addRigidBody(cell.body.get(), recalled ? kRecalledCell : kReleasedCell, others);
+}
+
+void World::Leave(std::size_t index) {
+  CellBody& cell = bodies_->cells[index];
+  if (cell.inside) bodies_->world.removeRigidBody(cell.body.get());
+  cell.inside = false;
+}
+
+bool World::Contains(std::size_t index) const { return bodies_->cells[index].inside; }
+
+void World::SetVelocity(std::size_t index, const Vec3& velocity, const Vec3& angular_velocity) {
+  btRigidBody& body = *bodies_->cells[index].body;
+  body.setLinearVelocity(LengthToBullet(velocity));
+  body.setAngularVelocity(ToBullet(angular_velocity));
+}
+
+BodyState World::State(std::size_t index) const {
+  const CellBody& cell = bodies_->cells[index];
+  return StateOf(*cell.body, cell.cell_from_body);
+}
+
+bool World::Sleeps(std::size_t index) const { return !bodies_->cells[index].body->isActive(); }
+
+void World::Drive(std::size_t index, const Rigid3& world_from_body) {
+  ObjectBody& object = bodies_->objects[index];
+  VOROCAST_CHECK(object.driven);
+  // Bullet takes a kinematic body's velocity from where it was at its last step.
+  object.body->setWorldTransform(ToBullet(world_from_body.translation, world_from_body.rotation));
+}
+
+void World::Loosen(std::size_t index) {
+  ObjectBody& object = bodies_->objects[index];
+  bodies_->world.removeRigidBody(object.body.get());
+  btVector3 inertia;
+  object.shape->calculateLocalInertia(static_cast<float>(object.mass), inertia);
+  object.body->setMassProps(static_cast<float>(object.mass), inertia);
+  object.body->setFlags(0);
+  PlaceBody(*object.body, object.start, Quat::Identity());
+  object.body->forceActivationState(object.arm > 0 ? DISABLE_DEACTIVATION : ACTIVE_TAG);
+  object.body->setSleepingThresholds(kSleepSpeed, kSleepTurn);
+  bodies_->world.addRigidBody(object.body.get(), kObject, kGround | kRecalledCell | kReleasedCell | kObject);
+  if (object.arm > 0) {
+    const btVector3 pivot_in_body(0, static_cast<float>(kUnits * object.arm), 0);
+    object.hinge = std::make_unique<btHingeConstraint>(*object.body, pivot_in_body, btVector3(0, 0, 1));
+    bodies_->world.addConstraint(object.hinge.get());
+  }
+}
+
+BodyState World::ObjectState(std::size_t index) const { return StateOf(*bodies_->objects[index].body, Quat::Identity()); }
+
+geometry::Box3 World::ObjectBounds(std::size_t index) const {
+  btVector3 low;
+  btVector3 high;
+  bodies_->objects[index].body->getAabb(low, high);
+  return {FromBullet(low) / kUnits, FromBullet(high) / kUnits};
+}
+
+void World::Step(double dt) { bodies_->world.stepSimulation(static_cast<float>(dt), 0); }
+
+}  // namespace vorocast::simulation

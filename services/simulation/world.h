@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "services/simulation/cell_shapes.h"
+#include "services/simulation/scene.h"
+
+namespace vorocast::simulation {
+
+/// The rigid bodies that may touch each other now, in Bullet. Lengths are metres here and centimetres inside, where Bullet's tolerances
+/// fit cells of a few centimetres.
+///
+/// Cells are in the world or out of it: what cannot touch anything costs nothing. Recalled cells never collide with each other nor with
+/// the ground; everything else does. Without threads, clocks and random order, so the same calls give the same bits.
+class World {
+ public:
+  enum class Role : std::uint8_t { kRecalled, kReleased };
+
+  World(double gravity, std::optional<double> ground_height, const Surface& ground);
+  ~World();
+  World(const World&) = delete;
+  World& operator=(const World&) = delete;
+
+  void AddCells(const std::vector<CellShape>& shapes, const Surface& surface);
+  void AddObject(const SceneBody& body);
+
+  /// Puts a cell into the world, or changes its role there.
+  void Enter(std::size_t cell, Role role, const BodyState& state);
+  void Leave(std::size_t cell);
+  bool Contains(std::size_t cell) const;
+  /// A recalled cell's velocities for the coming step.
+  void SetVelocity(std::size_t cell, const geometry::Vec3& velocity, const geometry::Vec3& angular_velocity);
+  /// In the cell's frame (template axes). The cell is in the world.
+  BodyState State(std::size_t cell) const;
+  /// Whether the cell lies still and is left out of the computation until something touches it.
+  bool Sleeps(std::size_t cell) const;
+
+  /// Moves a driven object to where it is at the end of the coming step.
+  void Drive(std::size_t object, const geometry::Rigid3& world_from_body);
+  /// Lets a held loose object go.
+  void Loosen(std::size_t object);
+  BodyState ObjectState(std::size_t object) const;
+  geometry::Box3 ObjectBounds(std::size_t object) const;
+
+  void Step(double dt);
+
+ private:
+  struct Bodies;
+  std::unique_ptr<Bodies> bodies_;
+};
+
+}  // namespace vorocast::simulation
