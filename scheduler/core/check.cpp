@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "scheduler/core/check.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include <fmt/format.h>
+
+namespace vorocast::core {
+namespace {
+
+#define REQUIRE_THAT(condition, ...) \
+  if (!(condition)) return absl::InternalError(fmt::format("{}: {}", fmt::format(__VA_ARGS__), #condition))
+
+absl::Status CheckTask(const State& state, TaskIndex index) {
+  const Task& task = state.tasks[index];
+  std::uint32_t unmet = 0;
+  for (const TaskInput& input : task.inputs) {
+    if (input.task == kNone) continue;
+    REQUIRE_THAT(input.task < index, "{}", task.name);
+    REQUIRE_THAT(state.tasks[input.task].job == task.job, "{}", task.name);
+    if (!HasEnded(state.tasks[input.task])) ++unmet;
+  }
+  if (const auto* blocked = std::get_if<Blocked>(&task.state)) {
+    REQUIRE_THAT(blocked->unmet == unmet, "{}: {} against {}", task.name, blocked->unmet, unmet);
+    REQUIRE_THAT(unmet > 0, "{} is blocked by nothing", task.name);
+  }
+  const auto* wanted = std::get_if<Wanted>(&task.state);
+  const auto* done = std::get_if<Done>(&task.state);
+  if (!wanted && !done) return absl::OkStatus();
+  REQUIRE_THAT(unmet == 0, "{}: inputs before outputs", task.name);
+  for (const TaskInput& input : task.inputs) {
+    if (input.task == kNone) continue;
+    const TaskState& maker = state.tasks[input.task].state;
+    REQUIRE_THAT(std::holds_alternative<Done>(maker) || (input.optional && std::holds_alternative<Failed>(maker)), "{}", task.name);
+  }
+  const base::Digest key = SpecOf(state, task).Key();
+  if (done) {
+    REQUIRE_THAT(done->key == key, "{}", task.name);
+    return absl::OkStatus();
+  }
+  const Run& run = state.runs[wanted->run];
+  REQUIRE_THAT(run.key == key, "{}", task.name);
+  REQUIRE_THAT(std::count(run.tasks.begin(), run.tasks.end(), index) == 1, "{}", task.name);
+  return absl::OkStatus();
+}
+
+absl::Status CheckRuns(const State& state) {
+  std::size_t ready = 0;
+  std::size_t timed = 0;
+  std::map<std::string, std::int32_t> leased_by_user;
+  std::set<std::int64_t> attempts;
+  for (const auto& [key, index] : state.run_by_key) {
+    const Run& run = state.runs[index];
+    REQUIRE_THAT(run.key == key, "run {}", index);
+    REQUIRE_THAT(!run.tasks.empty() || std::holds_alternative<Leased>(run.state), "run {} without tasks", index);
+    for (const TaskIndex task : run.tasks) {
+      const auto* wanted = std::get_if<Wanted>(&state.tasks[task].state);
+      REQUIRE_THAT(wanted && wanted->run == index, "run {}", index);
+    }
+    if (std::holds_alternative<Ready>(run.state)) ++ready;
+    if (const auto* resting = std::get_if<Resting>(&run.state)) {
+      ++timed;
+      REQUIRE_THAT(state.deadlines.contains({resting->until, index}), "run {}", index);
+    }
+    const auto* leased = std::get_if<Leased>(&run.state);
+    if (!leased) continue;
+    ++timed;
+    REQUIRE_THAT(run.saved, "run {}", index);
+    REQUIRE_THAT(attempts.insert(leased->attempt).second, "attempt {} twice", leased->attempt);
+    REQUIRE_THAT(leased->attempt < state.attempt_next && state.attempt_next <= state.attempt_reserved, "attempt {}", leased->attempt);
+    REQUIRE_THAT(state.deadlines.contains({leased->deadline, index}), "run {}", index);
+    REQUIRE_THAT(state.workers[leased->worker].runs.contains(index), "run {}", index);
+    if (!run.tasks.empty()) {
+      const TaskIndex first = *std::min_element(run.tasks.begin(), run.tasks.end(), [&](TaskIndex a, TaskIndex b) {
+        const auto rank = [&](TaskIndex t) { return std::tuple(-state.jobs[state.tasks[t].job].priority, state.tasks[t].job, t); };
+        return rank(a) < rank(b);
+      });
+      ++leased_by_user[state.jobs[state.tasks[first].job].user];
+    }
+  }
+  REQUIRE_THAT(state.run_by_key.size() + state.free_runs.size() == state.runs.size(), "runs");
+  REQUIRE_THAT(timed == state.deadlines.size(), "deadlines");
+  REQUIRE_THAT(leased_by_user == state.leased_by_user, "leases by user");
+  std::size_t queued = 0;
+  for (const auto& [key, group] : state.groups) {
+    for (const auto& places : group.ready) queued += places.size();
+  }
+  REQUIRE_THAT(queued == ready, "{} queued, {} ready", queued, ready);
+  return absl::OkStatus();
+}
+
+absl::Status CheckWorkers(const State& state) {
+  std::size_t idle = 0;
+  std::size_t leases = 0;
+  for (WorkerIndex index = 0; index < state.workers.size(); ++index) {
+    const Worker& worker = state.workers[index];
+    leases += worker.runs.size();
+    for (const RunIndex run : worker.runs) {
+      const auto* leased = std::get_if<Leased>(&state.runs[run].state);
+      REQUIRE_THAT(leased && leased->worker == index, "worker {}", worker.name);
+    }
+    if (worker.free() > 0) {
+      ++idle;
+      REQUIRE_THAT(state.idle.at(worker.kinds).contains({-worker.free(), index}), "worker {}", worker.name);
+      for (const auto& [key, group] : state.groups) {
+        for (std::size_t kind = 0; kind < kKinds; ++kind) {
+          REQUIRE_THAT(!(worker.kinds & (1u << kind)) || group.ready[kind].empty(), "worker {} is idle while work waits", worker.name);
+        }
+      }
+    }
+    if (worker.connection != 0) REQUIRE_THAT(state.worker_by_connection.at(worker.connection) == index, "worker {}", worker.name);
+    if (!worker.name.empty()) REQUIRE_THAT(state.worker_by_name.at(worker.name) == index, "worker {}", worker.name);
+  }
+  std::size_t listed = 0;
+  for (const auto& [kinds, workers] : state.idle) listed += workers.size();
+  REQUIRE_THAT(listed == idle, "idle workers");
+  std::size_t leased = 0;
+  for (const auto& [key, run] : state.run_by_key) leased += std::holds_alternative<Leased>(state.runs[run].state);
+  REQUIRE_THAT(leased == leases, "leases");
+  return absl::OkStatus();
+}
+
+absl::Status CheckJob(const State& state, const Job& job) {
+  std::array<KindCounts, kKinds> counts;
+  std::size_t running = 0;
+  std::set<TaskIndex> failed;
+  std::int32_t bad_frames = 0;
+  for (const TaskIndex index : job.tasks) {
+    const Task& task = state.tasks[index];
+    KindCounts& of_kind = counts[static_cast<std::size_t>(task.kind)];
+    const Phase phase = PhaseOf(state, task);
+    ++of_kind.phase[static_cast<std::size_t>(phase)];
+    running += phase == Phase::kRunning;
+    if (phase == Phase::kRunning) REQUIRE_THAT(job.running.contains(index), "{}", task.name);
+    if (const auto* done = std::get_if<Done>(&task.state)) {
+      of_kind.reused += done->reused;
+      of_kind.measured += !done->reused;
+      of_kind.seconds += done->reused ? 0 : done->result.seconds;
+    }
+    if (const auto* own = std::get_if<Failed>(&task.state); own && own->cause != Cause::kNeeds) {
+      failed.insert(index);
+      bad_frames += task.kind == tasks::Kind::kTessellate;
+    }
+    if (job.starts_nothing()) {
+      const auto* wanted = std::get_if<Wanted>(&task.state);
+      REQUIRE_THAT(!wanted || std::holds_alternative<LookingUp>(state.runs[wanted->run].state), "{} goes on in a stopped job", task.name);
+    }
+  }
+  for (std::size_t kind = 0; kind < kKinds; ++kind) {
+    REQUIRE_THAT(counts[kind].phase == job.counts[kind].phase, "{} counters of kind {}", job.id, kind);
+    REQUIRE_THAT(counts[kind].reused == job.counts[kind].reused && counts[kind].measured == job.counts[kind].measured, "{} kind {}", job.id, kind);
+    REQUIRE_THAT(std::abs(counts[kind].seconds - job.counts[kind].seconds) < 1e-6, "{} kind {}", job.id, kind);
+  }
+  REQUIRE_THAT(running == job.running.size(), "{}", job.id);
+  REQUIRE_THAT(failed == job.failed, "{}", job.id);
+  REQUIRE_THAT(bad_frames == job.bad_frames, "{}", job.id);
+  REQUIRE_THAT(job.starts_nothing() || !job.has_too_many_bad_frames(), "{}", job.id);
+  return absl::OkStatus();
+}
+
+#undef REQUIRE_THAT
+
+}  // namespace
+
+absl::Status Check(const State& state) {
+  for (TaskIndex index = 0; index < state.tasks.size(); ++index) RETURN_IF_ERROR(CheckTask(state, index));
+  RETURN_IF_ERROR(CheckRuns(state));
+  RETURN_IF_ERROR(CheckWorkers(state));
+  for (const Job& job : state.jobs) RETURN_IF_ERROR(CheckJob(state, job));
+  return absl::OkStatus();
+}
+
+}  // namespace vorocast::core

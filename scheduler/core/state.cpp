@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "scheduler/core/state.h"
+
+#include "services/base/check.h"
+
+namespace vorocast::core {
+namespace {
+
+Phase PhaseOf(const Run& run) { return std::holds_alternative<Leased>(run.state) ? Phase::kRunning : Phase::kReady; }
+
+}  // namespace
+
+Phase PhaseOf(const State& state, const Task& task) {
+  struct Visitor {
+    const State& state;
+    Phase operator()(const Blocked&) const { return Phase::kBlocked; }
+    Phase operator()(const Wanted& wanted) const { return PhaseOf(state.runs[wanted.run]); }
+    Phase operator()(const Done&) const { return Phase::kDone; }
+    Phase operator()(const Failed&) const { return Phase::kFailed; }
+    Phase operator()(const Cancelled&) const { return Phase::kCancelled; }
+  };
+  return std::visit(Visitor{state}, task.state);
+}
+
+tasks::TaskSpec SpecOf(const State& state, const Task& task) {
+  tasks::TaskSpec spec{.kind = task.kind, .options = *task.options};
+  spec.inputs.reserve(task.inputs.size());
+  for (const TaskInput& input : task.inputs) {
+    tasks::Input& named = spec.inputs.emplace_back();
+    named.role = input.role;
+    named.frame = input.frame;
+    named.extension = input.extension;
+    named.source = input.task == kNone ? tasks::Input::Source::kBlob : tasks::Input::Source::kArtifact;
+    if (input.task == kNone) {
+      named.digest = input.blob;
+      continue;
+    }
+    const Task& maker = state.tasks[input.task];
+    VOROCAST_CHECK(HasEnded(maker));
+    if (const auto* done = std::get_if<Done>(&maker.state)) named.digest = done->key;
+  }
+  return spec;
+}
+
+const Job* FindJob(const State& state, const std::string& id) {
+  const auto found = state.job_by_id.find(id);
+  return found == state.job_by_id.end() ? nullptr : &state.jobs[found->second];
+}
+
+}  // namespace vorocast::core

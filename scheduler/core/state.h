@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <tuple>
+#include <variant>
+#include <vector>
+
+#include "absl/container/flat_hash_map.h"
+#include "absl/time/time.h"
+#include "scheduler/core/event.h"
+#include "scheduler/core/record.h"
+
+/// All that the scheduler knows. A job has tasks; tasks that want the same result (equal keys, of any job) share one run; a run is what is
+/// leased to a worker. Everything is reached by dense indices or by key, and no event looks at all tasks.
+namespace vorocast::core {
+
+using JobIndex = std::uint32_t;
+using TaskIndex = std::uint32_t;
+using RunIndex = std::uint32_t;
+using WorkerIndex = std::uint32_t;
+inline constexpr std::uint32_t kNone = 0xffffffff;
+inline constexpr std::size_t kKinds = std::size(tasks::kAllKinds);
+
+// ---- A task's state, each with its own data.
+
+struct Blocked {
+  std::uint32_t unmet = 0;  // inputs whose tasks have not ended
+};
+struct Wanted {
+  RunIndex run = kNone;  // which says whether it is looked up, ready or leased
+};
+struct Done {
+  base::Digest key;
+  Result result;
+  bool reused = false;  // made for another job
+};
+struct Failed {
+  Cause cause = Cause::kInternal;
+  std::string message;
+};
+struct Cancelled {};
+using TaskState = std::variant<Blocked, Wanted, Done, Failed, Cancelled>;
+
+struct TaskInput {
+  std::string role;
+  std::int32_t frame = -1;
+  TaskIndex task = kNone;  // kNone: a blob
+  base::Digest blob;
+  std::string extension;
+  bool optional = false;
+};
+
+struct Task {
+  JobIndex job = kNone;
+  tasks::Kind kind = tasks::Kind::kTessellate;
+  std::string name;
+  std::shared_ptr<const nlohmann::json> options;  // shared by tasks with equal ones
+  std::vector<TaskInput> inputs;
+  std::vector<TaskIndex> dependents;  // once for each input that reads this
+  std::string output;
+  TaskState state = Blocked{};
+};
+
+// ---- A run's state.
+
+struct LookingUp {};  // asked whether the result exists
+struct Ready {};
+struct Resting {
+  absl::Time until;
+};
+struct Leased {
+  std::int64_t attempt = 0;
+  WorkerIndex worker = kNone;
+  absl::Time deadline;
+  double fraction = 0;
+};
+using RunState = std::variant<LookingUp, Ready, Resting, Leased>;
+
+struct Run {
+  base::Digest key;
+  tasks::Kind kind = tasks::Kind::kTessellate;
+  /// Never empty, but for a run that is still leased from before a restart and whose task has not been planned again yet.
+  std::vector<TaskIndex> tasks;
+  Tries tries;
+  bool saved = false;                                // the store has a RunSaved of it
+  absl::Time wanted_until = absl::InfiniteFuture();  // of a run without tasks: afterwards nobody can still want it
+  RunState state = LookingUp{};
+};
+
+/// What users see of a task, and what is counted.
+enum class Phase : std::uint8_t { kBlocked, kReady, kRunning, kDone, kFailed, kCancelled };
+inline constexpr std::size_t kPhases = 6;
+
+struct KindCounts {
+  std::array<std::int32_t, kPhases> phase{};
+  std::int32_t reused = 0;
+  double seconds = 0;         // of the done ones that were not reused
+  std::int32_t measured = 0;  // how many those are
+};
+
+struct Job {
+  std::string id;
+  std::string name;
+  std::string user;
+  std::int32_t priority = 0;
+  bool complete = false;  // every task is planned
+  bool cancelled = false;
+  std::optional<std::string> stopped;     // why nothing more is started: too many bad frames, or the rest cannot be planned
+  std::optional<std::string> impossible;  // the part of `stopped` that a retry does not forget
+  std::int32_t bad_frames_max = -1;
+  std::int32_t bad_frames = 0;
+  std::vector<TaskIndex> tasks;
+  absl::flat_hash_map<std::string, TaskIndex> by_name;
+  absl::flat_hash_map<std::string, TaskFailed> failed_before;  // a restart's memory, by task name
+  std::array<KindCounts, kKinds> counts;
+  std::set<TaskIndex> running;
+  std::set<TaskIndex> failed;  // of their own doing
+
+  bool has_too_many_bad_frames() const { return bad_frames_max >= 0 && bad_frames > bad_frames_max; }
+  bool starts_nothing() const { return cancelled || stopped.has_value(); }
+};
+
+struct Worker {
+  std::string name;
+  std::uint32_t kinds = 0;  // bit set by tasks::Kind
+  std::int32_t slots = 0;
+  ConnectionId connection = 0;  // 0: away
+  bool leaving = false;
+  bool silent = false;  // a lease ran out although the stream stands; gets nothing until it is heard again
+  std::set<RunIndex> runs;
+  std::int32_t free() const { return connection == 0 || leaving || silent ? 0 : slots - static_cast<std::int32_t>(runs.size()); }
+};
+
+/// Where a ready run stands: earlier jobs first, and within a job the order of the plan, so that a take flows through to its end.
+using Place = std::tuple<JobIndex, TaskIndex, RunIndex>;
+/// One user's ready runs of one priority.
+struct Group {
+  std::array<std::set<Place>, kKinds> ready;
+};
+struct GroupKey {
+  std::int32_t priority = 0;
+  std::string user;
+  friend bool operator<(const GroupKey& a, const GroupKey& b) { return a.priority != b.priority ? a.priority > b.priority : a.user < b.user; }
+};
+
+struct Settings {
+  absl::Duration lease = absl::Seconds(10);        // without a sign of life
+  absl::Duration grace = absl::Milliseconds(800);  // for a broken stream to come back
+  absl::Duration stall = absl::Seconds(3);         // a longer gap between ticks means that this process itself was stopped
+  std::int64_t memory_limit = std::int64_t{8} << 30;
+};
+
+struct State {
+  Settings settings;
+  std::vector<Job> jobs;
+  absl::flat_hash_map<std::string, JobIndex> job_by_id;
+  std::vector<Task> tasks;
+  std::vector<Run> runs;
+  std::vector<RunIndex> free_runs;
+  absl::flat_hash_map<base::Digest, RunIndex> run_by_key;
+  absl::flat_hash_map<base::Digest, Tries> tries_before;  // a restart's memory of runs that nobody held
+  std::vector<Worker> workers;
+  std::vector<WorkerIndex> free_workers;
+  absl::flat_hash_map<std::string, WorkerIndex> worker_by_name;
+  absl::flat_hash_map<ConnectionId, WorkerIndex> worker_by_connection;
+  std::map<GroupKey, Group> groups;  // never an empty one
+  std::map<std::string, std::int32_t> leased_by_user;
+  std::map<std::uint32_t, std::set<std::pair<std::int32_t, WorkerIndex>>> idle;  // by kinds: (−free slots, worker)
+  std::set<std::pair<absl::Time, RunIndex>> deadlines;                           // of leased and resting runs
+  std::int64_t attempt_next = 1;
+  std::int64_t attempt_reserved = 1;
+  absl::Time last_tick = absl::InfinitePast();
+};
+
+Phase PhaseOf(const State& state, const Task& task);
+inline bool HasEnded(const Task& task) { return !std::holds_alternative<Blocked>(task.state) && !std::holds_alternative<Wanted>(task.state); }
+/// With the inputs as they are now; those that failed are missing. All inputs must have ended.
+tasks::TaskSpec SpecOf(const State& state, const Task& task);
+const Job* FindJob(const State& state, const std::string& id);
+
+}  // namespace vorocast::core
