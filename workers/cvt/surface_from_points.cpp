@@ -9,6 +9,7 @@
 #include <ctime>
 
 #include "workers/cvt/cgal_poisson.h"
+#include "workers/cvt/local_isovalue.h"
 #include "workers/cvt/marching_cubes.h"
 #include "workers/cvt/point_areas.h"
 #include "workers/cvt/point_distance.h"
@@ -101,18 +102,6 @@ GridFrame ChooseGrid(const geometry::OrientedPoints& points, const IndicatorOpti
   return FitGrid(box, spacing, margin, options.grid_nodes_max);
 }
 
-/// Makes the indicator positive inside: subtracts its mean over the points' area.
-void SubtractIsovalue(const SortedPoints& points, ScalarGrid& indicator) {
-  double sum = 0;
-  double area = 0;
-  for (const GridPoint& p : points.points()) {
-    sum += static_cast<double>(p.area) * Interpolate(indicator, p.u);
-    area += p.area;
-  }
-  const float isovalue = static_cast<float>(sum / area);
-  for (float& value : indicator.value) value -= isovalue;
-}
-
 /// Mean over the grid's six faces: well away from the shape, so outside.
 double MeanOnBorder(const ScalarGrid& grid) {
   const auto& nodes = grid.frame.nodes;
@@ -136,7 +125,7 @@ absl::StatusOr<ScalarGrid> ComputeIndicator(const GridFrame& frame, const geomet
   // Smooth at least so far that the gaps between points do not show.
   const double smoothing = std::max(options.smoothing_cells, 0.8 * mean_spacing / frame.spacing);
   ScalarGrid indicator = SolveSpectralPoisson(frame, sorted, smoothing);
-  SubtractIsovalue(sorted, indicator);
+  SubtractLocalIsovalue(sorted, indicator);
   return indicator;
 }
 
