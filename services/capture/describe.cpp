@@ -13,8 +13,8 @@ namespace vorocast::capture {
 namespace {
 
 /// Heights of a standing or crouching person; outside of it the unit is doubtful.
-constexpr double kPersonMin_m = 0.5;
-constexpr double kPersonMax_m = 3;
+constexpr double kPersonHeightMin_m = 0.8;
+constexpr double kPersonHeightMax_m = 3;
 
 /// 73091 -> "73,091".
 std::string Grouped(std::int64_t value) {
@@ -163,7 +163,7 @@ std::string DescribeHints(const Inspection& inspection) {
     std::ranges::nth_element(heights, heights.begin() + static_cast<std::ptrdiff_t>(heights.size() / 2));
     const double median = heights[heights.size() / 2];
     const std::string unit = UnitOfPerson(median / inspection.capture.metres_per_unit);
-    if (median < kPersonMin_m || median > kPersonMax_m) {
+    if (median < kPersonHeightMin_m || median > kPersonHeightMax_m) {
       text += fmt::format("  a person would be {:.2f} m tall here: {}\n", median,
                           unit.empty() ? "check --units and --up" : fmt::format("did you mean --units {}?", unit));
     }
