@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "services/base/status.h"
+#include "services/geometry/vector.h"
+#include "workers/cvt/moments.h"
+#include "workers/cvt/solid.h"
+#include "workers/cvt/surface_pieces.h"
+#include "workers/cvt/voronoi_diagram.h"
+
+namespace vorocast::cvt {
+
+/// Where the surface crosses an edge of a cell: the boundary of the solid runs on from the bisector of `from` to that of `to`. It leaves
+/// the solid in the direction in which the edge runs counter-clockwise around the face of `from`.
+struct EdgeCrossing {
+  std::int32_t cell;
+  std::int32_t from, to;  // sites
+  std::int32_t triangle;
+  geometry::Vec3 position;  // from the cell's site
+};
+
+/// Everything the polyhedra are assembled from, when asked for.
+struct ClippedComplex {
+  struct Corner {
+    VertexKey key;
+    geometry::Vec3 position;
+    std::int32_t across;  // the site across the edge to the next corner, or −1 where it lies on a side of the triangle
+  };
+  struct Piece {
+    std::int32_t cell;
+    std::int32_t triangle;
+    std::int64_t corner_begin;
+    std::int32_t corner_count;
+  };
+  std::vector<geometry::Vec3> sites;  // as clipped: given ones, moved by a hair if that was needed
+  std::vector<Piece> pieces;          // by triangle
+  std::vector<Corner> corners;
+  std::vector<EdgeCrossing> crossings;       // sorted by cell
+  std::vector<std::int64_t> crossing_begin;  // [n+1]
+  std::vector<std::int64_t> inside_begin;    // [n] into `inside` for the cells at the surface; −1 for those wholly in or out
+  std::vector<std::uint8_t> inside;          // by corner of the cell in the diagram: 1 where it lies in the solid
+};
+
+/// The Voronoi cells of sites clipped at the surface of one solid, as moments. Keeps its work (neighbours, nearest sites) from call to
+/// call: the next call with sites close to the last ones is faster, with the same result up to rounding.
+class ClippedCells {
+ public:
+  /// Keeps a reference to the solid.
+  ClippedCells(const Solid& solid, Neighbours neighbours) : solid_(solid), neighbours_(neighbours), clipper_(solid, sites_, diagram_) {}
+  ClippedCells(const ClippedCells&) = delete;
+  ClippedCells& operator=(const ClippedCells&) = delete;
+
+  /// Evaluates all cells; `complex` may be null. Where rounding leaves a contradiction the sites are moved by a hair (10⁻⁹ spacings) and
+  /// all is done again, so the moments are those of such sites. INTERNAL when that does not help either.
+  absl::Status Evaluate(const std::vector<geometry::Vec3>& sites, ClippedComplex* complex);
+
+  /// Of the last call, one a site; about the sites as clipped.
+  const std::vector<Moments>& moments() const { return moments_; }
+  /// 1 where the cell touches the surface.
+  const std::vector<std::uint8_t>& boundary() const { return boundary_; }
+  const VoronoiDiagram& diagram() const { return diagram_; }
+  double energy() const { return energy_; }
+
+ private:
+  bool Attempt();
+  bool FindNearestSites();
+  std::int32_t Walk(const geometry::Vec3& point, std::int32_t start) const;
+  bool AddSurface();
+  bool AddTriangle(std::int32_t triangle);
+  bool AddPiece(std::int32_t triangle, std::int32_t site);
+  void KeepPiece(std::int32_t triangle, std::int32_t site);
+  void SortCrossings();
+  bool AddFaces();
+  bool AddBoundaryCell(std::int32_t site);
+  bool CollectExits(std::int32_t site);
+  bool FindInsideCorners(std::int32_t site);
+  void AddFaceEdges(std::int32_t site);
+  bool MarkOutsideNeighbours(std::int32_t site);
+  bool AddInteriorCell(std::int32_t site);
+
+  const Solid& solid_;
+  Neighbours neighbours_;
+  VoronoiDiagram diagram_;
+  std::vector<std::int32_t> nearest_;  // [mesh vertices]
+  std::vector<Moments> moments_;
+  std::vector<std::uint8_t> boundary_;
+  double energy_ = 0;
+
+  // Of the call under way.
+  std::vector<geometry::Vec3> sites_;  // as clipped
+  ClippedComplex* complex_ = nullptr;
+  TriangleClipper clipper_;
+  std::vector<EdgeCrossing> crossings_;
+  std::vector<std::int64_t> crossing_begin_;
+  std::vector<std::int32_t> queued_in_;  // [n] the triangle whose queue last held the site
+  std::vector<std::int32_t> queue_;
+  SurfacePiece piece_;
+  enum class Side : std::uint8_t { kUnknown, kInside, kOutside };
+  std::vector<Side> side_;  // [n] of cells that the surface does not touch
+  struct Exit {             // one crossing of the edge that leaves a corner by a slot: +1 leaves the solid, −1 enters it
+    std::int32_t corner, slot, sign;
+    geometry::Vec3 position;
+  };
+  std::vector<Exit> exits_;           // of the cell under way, as all below
+  std::vector<std::int32_t> net_;     // [3 corners] signs summed over an edge, in the direction in which it leaves the corner
+  std::vector<std::int32_t> level_;   // [corners] 1 + status, up to a constant
+  std::vector<std::uint8_t> inside_;  // [corners]
+  std::vector<std::int32_t> stack_;
+};
+
+}  // namespace vorocast::cvt

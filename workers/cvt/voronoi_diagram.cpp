@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "workers/cvt/voronoi_diagram.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "workers/cvt/delaunay.h"
+
+namespace vorocast::cvt {
+namespace {
+
+using geometry::Vec3;
+
+/// Reach of a cell before anything is known about it, in spacings: a relaxed cell's corners lie within 0.8 spacings.
+constexpr double kFirstReach = 1.15;
+
+}  // namespace
+
+bool VoronoiDiagram::Build(const std::vector<Vec3>& sites, double spacing, Neighbours neighbours) {
+  const bool warm = cells_.size() == sites.size();
+  std::swap(cells_, last_cells_);
+  std::swap(names_, last_names_);
+  cells_.assign(sites.size(), {});
+  planes_.clear();
+  names_.clear();
+  corners_.clear();
+  planes_.reserve(16 * sites.size());
+  names_.reserve(16 * sites.size());
+  corners_.reserve(28 * sites.size());
+  sites_ = sites;
+  grid_.Build(sites_, spacing);
+  seen_.assign(sites_.size(), -1);
+  neighbours_ = neighbours;
+  if (neighbours_ == Neighbours::kTetGen) {
+    auto delaunay = DelaunayNeighbours(sites_);
+    // Without a tetrahedrisation (few sites, or all in a plane) the grid finds the neighbours.
+    if (delaunay.ok())
+      delaunay_ = *std::move(delaunay);
+    else
+      neighbours_ = Neighbours::kGrid;
+  }
+  for (std::int32_t i = 0; i < static_cast<std::int32_t>(sites_.size()); ++i) {
+    double reach = kFirstReach * spacing;
+    std::span<const std::int32_t> candidates;
+    if (warm) {
+      const Cell& last = last_cells_[i];
+      reach = std::max(reach, last.reach);
+      candidates = {last_names_.data() + last.plane_begin, static_cast<std::size_t>(last.plane_count)};
+    }
+    if (!BuildCell(i, reach, candidates)) return false;
+  }
+  return true;
+}
+
+bool VoronoiDiagram::Enlarge(std::int32_t site, double reach) {
+  const std::vector<std::int32_t> candidates(names(cells_[site]).begin(), names(cells_[site]).end());
+  return BuildCell(site, reach, candidates);
+}
+
+bool VoronoiDiagram::BuildCell(std::int32_t site, double reach, std::span<const std::int32_t> candidates) {
+  const Vec3 centre = sites_[site];
+  work_.Reset(reach);
+  bool sound = true;
+  if (neighbours_ == Neighbours::kTetGen) {
+    for (std::int32_t other : delaunay_[site]) sound = sound && work_.Cut((sites_[other] - centre) / 2, other);
+  } else {
+    // A candidate may come twice (first by name, then from the grid); the marks are cleared because a cell may be built again.
+    seen_[site] = site;
+    for (std::int32_t other : candidates) {
+      if (other < 0) continue;
+      seen_[other] = site;
+      sound = sound && work_.Cut((sites_[other] - centre) / 2, other);
+    }
+    // A bisector further away than the furthest corner cuts nothing: neighbours lie within twice that (the security radius).
+    grid_.Around(
+        centre, [&] { return sound ? 4 * work_.RadiusSquared() : -1.0; },
+        [&](const SiteGrid::Entry& entry) {
+          if (!sound || seen_[entry.site] == site) return;
+          if (SquaredDistance(entry.position, centre) < 4 * work_.RadiusSquared()) {
+            sound = work_.Cut((entry.position - centre) / 2, entry.site);
+          }
+        });
+    for (std::int32_t other : candidates) {
+      if (other >= 0) seen_[other] = -1;
+    }
+  }
+  if (!sound || work_.corner_count() > std::numeric_limits<std::uint16_t>::max()) return false;
+  Store(site, reach);
+  return true;
+}
+
+void VoronoiDiagram::Store(std::int32_t site, double reach) {
+  Cell cell;
+  cell.reach = reach;
+  cell.plane_begin = static_cast<std::int64_t>(planes_.size());
+  cell.corner_begin = static_cast<std::int64_t>(corners_.size());
+  cell.corner_count = work_.corner_count();
+  renumbered_.assign(work_.plane_count(), -1);
+  for (std::int32_t i = 0; i < work_.corner_count(); ++i) {
+    for (std::int32_t p : work_.corner(i).plane) renumbered_[p] = 0;
+  }
+  order_.clear();
+  for (std::int32_t p = 0; p < work_.plane_count(); ++p) {
+    if (renumbered_[p] == 0) order_.push_back(p);
+  }
+  // Near planes first: as next time's candidates they cut the most, and their faces are the largest.
+  std::ranges::sort(order_, [&](std::int32_t a, std::int32_t b) {
+    return work_.plane(a).square != work_.plane(b).square ? work_.plane(a).square < work_.plane(b).square : a < b;
+  });
+  cell.inner_squared = work_.plane(order_[0]).square;
+  for (std::int32_t p : order_) {
+    renumbered_[p] = cell.plane_count++;
+    planes_.push_back(work_.plane(p));
+    names_.push_back(work_.name(p));
+    cell.truncated = cell.truncated || work_.name(p) < 0;
+  }
+  for (std::int32_t i = 0; i < work_.corner_count(); ++i) {
+    const ConvexCell::Corner& from = work_.corner(i);
+    Corner to{work_.position(i), {}, {}};
+    for (int s = 0; s < 3; ++s) {
+      to.plane[s] = static_cast<std::uint16_t>(renumbered_[from.plane[s]]);
+      to.next[s] = static_cast<std::uint16_t>(from.next[s]);
+    }
+    corners_.push_back(to);
+  }
+  cells_[site] = cell;
+}
+
+}  // namespace vorocast::cvt

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "services/geometry/vector.h"
+#include "workers/cvt/convex_cell.h"
+#include "workers/cvt/site_grid.h"
+#include "workers/cvt/tessellate.h"
+
+namespace vorocast::cvt {
+
+/// The Voronoi cells of all sites, not clipped at any surface but each bounded to its site's surroundings (its reach): what a cell
+/// looks like further away than that is not computed, and who needs it asks for a larger reach. Positions are relative to the site.
+class VoronoiDiagram {
+ public:
+  struct Corner {
+    geometry::Vec3 position;
+    std::array<std::uint16_t, 3> plane;  // of the cell; as ConvexCell::Corner
+    std::array<std::uint16_t, 3> next;   // of the cell
+  };
+  struct Cell {
+    std::int64_t plane_begin = 0;
+    std::int64_t corner_begin = 0;
+    std::int32_t plane_count = 0;
+    std::int32_t corner_count = 0;
+    double reach = 0;          // the cell is right within this distance of its site
+    double inner_squared = 0;  // squared distance to the nearest bisector
+    bool truncated = false;    // some corner is of the reach's making
+  };
+
+  /// Cells of `sites`, those of the last call with as many sites being taken as first candidates for neighbours.
+  /// False when rounding left a cell contradictory: move the sites by a hair.
+  bool Build(const std::vector<geometry::Vec3>& sites, double spacing, Neighbours neighbours);
+  /// Computes one cell again with a larger reach.
+  bool Enlarge(std::int32_t site, double reach);
+
+  const Cell& cell(std::int32_t site) const { return cells_[site]; }
+  std::span<const HalfSpace> planes(const Cell& cell) const {
+    return {planes_.data() + cell.plane_begin, static_cast<std::size_t>(cell.plane_count)};
+  }
+  /// Neighbours across the planes; negative for planes of the reach's making.
+  std::span<const std::int32_t> names(const Cell& cell) const {
+    return {names_.data() + cell.plane_begin, static_cast<std::size_t>(cell.plane_count)};
+  }
+  std::span<const Corner> corners(const Cell& cell) const {
+    return {corners_.data() + cell.corner_begin, static_cast<std::size_t>(cell.corner_count)};
+  }
+  const SiteGrid& grid() const { return grid_; }
+  std::size_t size() const { return cells_.size(); }
+
+ private:
+  bool BuildCell(std::int32_t site, double reach, std::span<const std::int32_t> candidates);
+  void Store(std::int32_t site, double reach);
+
+  std::vector<geometry::Vec3> sites_;
+  Neighbours neighbours_ = Neighbours::kGrid;
+  SiteGrid grid_;
+  ConvexCell work_;
+  std::vector<std::int32_t> order_, renumbered_;  // scratch of Store
+  std::vector<std::int32_t> seen_;                // [n] the site that last tried this one as a neighbour
+
+  std::vector<Cell> cells_;
+  std::vector<HalfSpace> planes_;
+  std::vector<std::int32_t> names_;
+  std::vector<Corner> corners_;
+  std::vector<Cell> last_cells_;
+  std::vector<std::int32_t> last_names_;
+  std::vector<std::vector<std::int32_t>> delaunay_;  // with Neighbours::kTetGen
+};
+
+}  // namespace vorocast::cvt
