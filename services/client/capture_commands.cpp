@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
+#include <algorithm>
 #include <memory>
 #include <string>
 
@@ -31,7 +32,7 @@ void AddInspect(CLI::App& program, int& exit_code) {
       ASSIGN_OR_RETURN(const capture::Inspection inspection, capture::InspectCapture(capture, [&](double fraction) { view.Show(fraction); }));
       view.Finish();
       fmt::print("{}", capture::Describe(inspection));
-      return inspection.all_frames_usable();
+      return std::ranges::all_of(inspection.frames, [](const capture::FrameFacts& frame) { return frame.status.ok(); });
     };
     const auto usable = inspect();
     exit_code = !usable.ok() ? PrintError(usable.status()) : *usable ? 0 : 1;
