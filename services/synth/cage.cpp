@@ -24,41 +24,41 @@ constexpr double kFloor_m = -0.55;
 constexpr double kRadius_m = 0.135;
 constexpr double kBar_m = 0.0135;
 constexpr int kBars = 8;
+constexpr std::int32_t kWork = 0;  // rings and bars are one limb: equal wires do not swell where they meet
 
 Vec3 OnRing(double angle, double radius, double height) { return {radius * std::cos(angle), height, radius * std::sin(angle)}; }
 
-void AddRing(double radius, double height, std::vector<Blob>& blobs) {
+void AddRing(double radius, double height, ImplicitSurface& surface) {
   constexpr int kPieces = 20;
   for (int i = 0; i < kPieces; ++i) {
     const double step = 2 * std::numbers::pi / kPieces;
-    blobs.push_back({OnRing(i * step, radius, height), OnRing((i + 1) * step, radius, height), kBar_m, kBar_m});
+    surface.Add({OnRing(i * step, radius, height), OnRing((i + 1) * step, radius, height), kBar_m, kBar_m, Vec3::Ones(), 0, 0, kWork});
   }
 }
 
 }  // namespace
 
 geometry::TriangleMesh MakeCage(double cell_m) {
-  ImplicitSurface surface{.blend = 0.010};
-  std::vector<Blob>& blobs = surface.blobs;
+  ImplicitSurface surface(0.010, 0.004);
   const double shoulder = kFloor_m + 0.25;  // where the bars begin to bend inwards
-  AddRing(kRadius_m, kFloor_m + 0.135, blobs);
+  AddRing(kRadius_m, kFloor_m + 0.135, surface);
   for (int i = 0; i < kBars; ++i) {
     const double angle = 2 * std::numbers::pi * i / kBars;
-    blobs.push_back({OnRing(angle, kRadius_m, kFloor_m), OnRing(angle, kRadius_m, shoulder), kBar_m, kBar_m});
+    surface.Add({OnRing(angle, kRadius_m, kFloor_m), OnRing(angle, kRadius_m, shoulder), kBar_m, kBar_m, Vec3::Ones(), 0, 0, kWork});
     constexpr int kArc = 5;
     const auto on_dome = [&](int k) {
       const double a = 0.5 * std::numbers::pi * k / kArc;
       return OnRing(angle, kRadius_m * std::cos(a), shoulder + (kTop_m - 0.03 - shoulder) * std::sin(a));
     };
-    for (int k = 0; k < kArc; ++k) blobs.push_back({on_dome(k), on_dome(k + 1), kBar_m, kBar_m});
+    for (int k = 0; k < kArc; ++k) surface.Add({on_dome(k), on_dome(k + 1), kBar_m, kBar_m, Vec3::Ones(), 0, 0, kWork});
   }
   // Floor, knob, and the bird on its stand.
-  blobs.push_back({Vec3(0, kFloor_m, 0), Vec3(0, kFloor_m, 0), kRadius_m + 0.02, kRadius_m + 0.02, Vec3(1, 0.12, 1)});
-  blobs.push_back({Vec3(0, kTop_m - 0.02, 0), Vec3(0, kTop_m, 0), 0.030, 0.016});
-  blobs.push_back({Vec3(0, kFloor_m, 0), Vec3(0, kFloor_m + 0.10, 0), 0.020, 0.016});
-  blobs.push_back({Vec3(0, kFloor_m + 0.115, -0.025), Vec3(0, kFloor_m + 0.14, 0.015), 0.028, 0.038});
-  blobs.push_back({Vec3(0, kFloor_m + 0.105, -0.03), Vec3(0, kFloor_m + 0.085, -0.075), 0.020, 0.013});
-  blobs.push_back({Vec3(0, kFloor_m + 0.185, 0.028), Vec3(0, kFloor_m + 0.182, 0.058), 0.027, 0.013});
+  surface.Add({Vec3(0, kFloor_m, 0), Vec3(0, kFloor_m, 0), kRadius_m + 0.02, kRadius_m + 0.02, Vec3(1, 0.12, 1)});
+  surface.Add({Vec3(0, kTop_m - 0.02, 0), Vec3(0, kTop_m, 0), 0.030, 0.016});
+  surface.Add({Vec3(0, kFloor_m, 0), Vec3(0, kFloor_m + 0.10, 0), 0.020, 0.016});
+  surface.Add({Vec3(0, kFloor_m + 0.115, -0.025), Vec3(0, kFloor_m + 0.14, 0.015), 0.028, 0.038});
+  surface.Add({Vec3(0, kFloor_m + 0.105, -0.03), Vec3(0, kFloor_m + 0.085, -0.075), 0.020, 0.013});
+  surface.Add({Vec3(0, kFloor_m + 0.185, 0.028), Vec3(0, kFloor_m + 0.182, 0.058), 0.027, 0.013});
   geometry::TriangleMesh mesh = ExtractSurface(surface, cell_m);
   for (const Vec3& x : mesh.vertices) mesh.colours.push_back(ColourOf(Part::kCage, x - Vec3(0, kFloor_m, 0)));
   return mesh;

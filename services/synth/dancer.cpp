@@ -20,14 +20,19 @@ constexpr int kWeightSmoothing = 6;
 
 class Sculptor {
  public:
-  explicit Sculptor(std::vector<Blob>& blobs) : blobs_(blobs) {}
+  explicit Sculptor(ImplicitSurface& surface) : surface_(surface) {}
 
+  /// What follows is one limb; a negative number ends it.
+  Sculptor& Limb(std::int32_t limb) {
+    limb_ = limb;
+    return *this;
+  }
   Sculptor& On(std::int32_t bone, Part part) {
     bone_ = bone, part_ = part;
     return *this;
   }
   Sculptor& Swept(const Vec3& from, const Vec3& to, double from_radius, double to_radius, const Vec3& stretch = Vec3::Ones()) {
-    blobs_.push_back({from, to, from_radius, to_radius, stretch, bone_, static_cast<std::int32_t>(part_)});
+    surface_.Add({from, to, from_radius, to_radius, stretch, bone_, static_cast<std::int32_t>(part_), limb_});
     return *this;
   }
   /// An ellipsoid by its half axes.
@@ -37,8 +42,9 @@ class Sculptor {
   }
 
  private:
-  std::vector<Blob>& blobs_;
+  ImplicitSurface& surface_;
   std::int32_t bone_ = 0;
+  std::int32_t limb_ = -1;
   Part part_ = Part::kTorso;
 };
 
@@ -75,7 +81,7 @@ void SculptArm(Sculptor& sculptor, bool left) {
   const Vec3& shoulder = joints[static_cast<std::size_t>(upper)];
   const Vec3& elbow = joints[static_cast<std::size_t>(upper) + 1];
   const Vec3& wrist = joints[static_cast<std::size_t>(upper) + 2];
-  sculptor.On(upper, part).Swept(shoulder, elbow, 0.047, 0.036).Swept(shoulder + 0.03 * along, shoulder + 0.12 * along, 0.050, 0.040);
+  sculptor.Limb(upper).On(upper, part).Swept(shoulder, elbow, 0.047, 0.036).Swept(shoulder + 0.03 * along, shoulder + 0.12 * along, 0.050, 0.040);
   sculptor.On(upper + 1, part).Swept(elbow, wrist, 0.036, 0.025).Swept(elbow + 0.03 * along, elbow + 0.12 * along, 0.039, 0.032);
   // A mitten: fingers are finer than the depth cameras resolve.
   sculptor.On(upper + 2, part)
@@ -92,19 +98,20 @@ void SculptLeg(Sculptor& sculptor, bool left) {
   const Vec3& hip = joints[static_cast<std::size_t>(thigh)];
   const Vec3& knee = joints[static_cast<std::size_t>(thigh) + 1];
   const Vec3& ankle = joints[static_cast<std::size_t>(thigh) + 2];
-  sculptor.On(thigh, part).Swept(hip, knee, 0.084, 0.051).Swept(hip + 0.06 * along, hip + 0.22 * along, 0.084, 0.072);
+  sculptor.Limb(thigh).On(thigh, part).Swept(hip, knee, 0.084, 0.051).Swept(hip + 0.06 * along, hip + 0.22 * along, 0.084, 0.072);
   sculptor.On(thigh + 1, part).Swept(knee, ankle, 0.050, 0.033).Swept(knee + Vec3(0, -0.07, -0.018), knee + Vec3(0, -0.17, -0.016), 0.046, 0.041);
   const Vec3 sole(ankle.x(), 0, ankle.z());
   const double toe_out = left ? 0.02 : -0.02;
-  sculptor.On(thigh + 2, Part::kShoes)
+  sculptor.Limb(thigh + 2)
+      .On(thigh + 2, Part::kShoes)
       .Swept(ankle, sole + Vec3(0, 0.035, -0.032), 0.036, 0.037)
       .Swept(sole + Vec3(0, 0.045, 0.0), sole + Vec3(toe_out * 0.7, 0.026, 0.125), 0.038, 0.038, {1.0, 0.8, 1})
       .Swept(sole + Vec3(toe_out * 0.7, 0.026, 0.125), sole + Vec3(toe_out, 0.018, 0.168), 0.036, 0.025, {1.0, 0.75, 1});
 }
 
 ImplicitSurface SculptDancer() {
-  ImplicitSurface surface{.blend = 0.034, .floor = 0.0};
-  Sculptor sculptor(surface.blobs);
+  ImplicitSurface surface(0.034, 0.012, 0.0);
+  Sculptor sculptor(surface);
   SculptHead(sculptor);
   SculptTorso(sculptor);
   for (const bool left : {true, false}) {
@@ -118,7 +125,7 @@ ImplicitSurface SculptDancer() {
 PerBone<double> WeightsAt(const ImplicitSurface& surface, const Vec3& x) {
   PerBone<double> distance;
   distance.fill(1e9);
-  for (const Blob& blob : surface.blobs) {
+  for (const Blob& blob : surface.blobs()) {
     double& d = distance[static_cast<std::size_t>(blob.bone)];
     d = std::min(d, blob.Distance(x));
   }
@@ -171,7 +178,7 @@ SkinWeights FourLargest(const PerBone<double>& weights) {
 }
 
 std::int32_t NearestPart(const ImplicitSurface& surface, const Vec3& x) {
-  const auto nearest = std::ranges::min_element(surface.blobs, {}, [&](const Blob& blob) { return blob.Distance(x); });
+  const auto nearest = std::ranges::min_element(surface.blobs(), {}, [&](const Blob& blob) { return blob.Distance(x); });
   return nearest->part;
 }
 

@@ -5,6 +5,8 @@
 #include <array>
 #include <cmath>
 
+#include "services/base/check.h"
+
 namespace vorocast::synth {
 namespace {
 
@@ -44,17 +46,17 @@ struct Grid {
   Vec3 Corner(std::int32_t i, std::int32_t j, std::int32_t k) const { return origin + cell * Vec3(i, j, k); }
 };
 
-Grid SampleGrid(const ImplicitSurface& surface, double cell) {
+Grid SampleGrid(const ImplicitSurface& surface, double cell, double shift) {
   constexpr std::int32_t kBlock = 6;
   const Box3 bounds = surface.Bounds();
-  Grid grid{.origin = bounds.min() - Vec3::Constant(2 * cell), .cell = cell};
+  Grid grid{.origin = bounds.min() - Vec3::Constant(2 * cell + shift), .cell = cell};
   for (int axis = 0; axis < 3; ++axis) {
-    grid.size[static_cast<std::size_t>(axis)] = static_cast<std::int32_t>(std::ceil(bounds.sizes()[axis] / cell)) + 5;
+    grid.size[static_cast<std::size_t>(axis)] = static_cast<std::int32_t>(std::ceil(bounds.sizes()[axis] / cell)) + 6;
   }
   const auto [nx, ny, nz] = grid.size;
   grid.values.resize(grid.Index(0, 0, nz));
   // The field is no exact distance: blends lower it and stretches shrink it, so the test for "far away" keeps a reserve.
-  const double reach = 0.5 * std::sqrt(3.0) * kBlock * cell * 1.3 + surface.blend;
+  const double reach = 0.5 * std::sqrt(3.0) * kBlock * cell * 1.3 + surface.blend_m();
   for (std::int32_t k0 = 0; k0 < nz; k0 += kBlock) {
     for (std::int32_t j0 = 0; j0 < ny; j0 += kBlock) {
       for (std::int32_t i0 = 0; i0 < nx; i0 += kBlock) {
@@ -159,18 +161,40 @@ void SpreadVertices(const ImplicitSurface& surface, double cell, geometry::Trian
 }  // namespace
 
 double Blob::Distance(const Vec3& x) const {
-  return SweptBallDistance((x - from).cwiseQuotient(stretch), Vec3::Zero(), (to - from).cwiseQuotient(stretch), from_radius, to_radius) *
-         std::min(1.0, stretch.minCoeff());
+  const Vec3 local = (x - from).cwiseQuotient(stretch);
+  const Vec3 axis = (to - from).cwiseQuotient(stretch);
+  const double d = SweptBallDistance(local, Vec3::Zero(), axis, from_radius, to_radius);
+  if (stretch == Vec3::Ones()) return d;
+  // In stretched space the field rises by one a metre along `rise`; in the world it rises faster where the blob is flat.
+  const double length2 = axis.squaredNorm();
+  const double along = length2 > 0 ? std::clamp(local.dot(axis) / length2, 0.0, 1.0) : 0.0;
+  const Vec3 rise = local - along * axis;
+  return d * rise.norm() / std::max(rise.cwiseQuotient(stretch).norm(), 1e-12);
+}
+
+void ImplicitSurface::Add(const Blob& blob) {
+  blobs_.push_back(blob);
+  const double radius = std::max(blob.from_radius, blob.to_radius) * blob.stretch.maxCoeff();
+  around_.push_back({0.5 * (blob.from + blob.to), 0.5 * (blob.to - blob.from).norm() + radius});
 }
 
 double ImplicitSurface::operator()(const Vec3& x) const {
-  double d = 1e9;
-  for (const Blob& blob : blobs) {
-    const double other = blob.Distance(x);
-    const double h = std::max(blend - std::abs(d - other), 0.0) / blend;
-    d = std::min(d, other) - h * h * blend / 4;
+  constexpr double kFar = 1e9;
+  const auto melt = [](double a, double b, double width) {
+    const double h = std::max(width - std::abs(a - b), 0.0) / width;
+    return std::min(a, b) - h * h * width / 4;
+  };
+  double whole = kFar, limb = kFar;
+  for (std::size_t i = 0; i < blobs_.size(); ++i) {
+    if (i > 0 && (blobs_[i].limb < 0 || blobs_[i].limb != blobs_[i - 1].limb)) {
+      whole = melt(whole, limb, blend_);
+      limb = kFar;
+    }
+    // A blob farther than this changes nothing.
+    if ((x - around_[i].centre).norm() - around_[i].radius > std::min(whole, limb) + 2 * blend_) continue;
+    limb = melt(limb, blobs_[i].Distance(x), seam_);
   }
-  return std::max(d, floor - x.y());
+  return std::max(melt(whole, limb, blend_), floor_ - x.y());
 }
 
 Vec3 ImplicitSurface::Gradient(const Vec3& x) const {
@@ -185,23 +209,30 @@ Vec3 ImplicitSurface::Gradient(const Vec3& x) const {
 
 Box3 ImplicitSurface::Bounds() const {
   Box3 bounds;
-  for (const Blob& blob : blobs) {
+  for (const Blob& blob : blobs_) {
     for (const auto& [centre, radius] : {std::pair(blob.from, blob.from_radius), std::pair(blob.to, blob.to_radius)}) {
       bounds.extend(centre - radius * blob.stretch);
       bounds.extend(centre + radius * blob.stretch);
     }
   }
-  bounds.min().array() -= blend / 2;
-  bounds.max().array() += blend / 2;
-  bounds.min().y() = std::max(bounds.min().y(), floor);
+  bounds.min().array() -= blend_ / 2;
+  bounds.max().array() += blend_ / 2;
+  bounds.min().y() = std::max(bounds.min().y(), floor_);
   return bounds;
 }
 
 geometry::TriangleMesh ExtractSurface(const ImplicitSurface& surface, double cell_m) {
-  const Grid grid = SampleGrid(surface, cell_m);
+  // Where two sheets of the level pass through one cell, its one vertex would pinch them together; a grid shifted a little has them apart.
+  constexpr int kTries = 8;
   geometry::TriangleMesh mesh;
-  const std::vector<std::int32_t> vertex_of_cell = PlaceVertices(grid, mesh);
-  JoinVertices(grid, vertex_of_cell, mesh);
+  for (int attempt = 0; attempt < kTries; ++attempt) {
+    const Grid grid = SampleGrid(surface, cell_m, 0.137 * attempt * cell_m);
+    mesh = {};
+    const std::vector<std::int32_t> vertex_of_cell = PlaceVertices(grid, mesh);
+    JoinVertices(grid, vertex_of_cell, mesh);
+    if (geometry::IsClosed(mesh)) break;
+  }
+  VOROCAST_CHECK(geometry::IsClosed(mesh));
   SpreadVertices(surface, cell_m, mesh);
   return mesh;
 }
