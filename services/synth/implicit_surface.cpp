@@ -47,7 +47,7 @@ struct Grid {
 };
 
 Grid SampleGrid(const ImplicitSurface& surface, double cell, double shift) {
-  constexpr std::int32_t kBlock = 6;
+  constexpr std::int32_t kBlock = 4;
   const Box3 bounds = surface.Bounds();
   Grid grid{.origin = bounds.min() - Vec3::Constant(2 * cell + shift), .cell = cell};
   for (int axis = 0; axis < 3; ++axis) {
@@ -56,7 +56,7 @@ Grid SampleGrid(const ImplicitSurface& surface, double cell, double shift) {
   const auto [nx, ny, nz] = grid.size;
   grid.values.resize(grid.Index(0, 0, nz));
   // The field is no exact distance: blends lower it and stretches shrink it, so the test for "far away" keeps a reserve.
-  const double reach = 0.5 * std::sqrt(3.0) * kBlock * cell * 1.3 + surface.blend_m();
+  const double reach = 0.5 * std::sqrt(3.0) * kBlock * cell * 1.3 + surface.blend_m() / 4;
   for (std::int32_t k0 = 0; k0 < nz; k0 += kBlock) {
     for (std::int32_t j0 = 0; j0 < ny; j0 += kBlock) {
       for (std::int32_t i0 = 0; i0 < nx; i0 += kBlock) {
@@ -191,20 +191,19 @@ double ImplicitSurface::operator()(const Vec3& x) const {
       limb = kFar;
     }
     // A blob farther than this changes nothing.
-    if ((x - around_[i].centre).norm() - around_[i].radius > std::min(whole, limb) + 2 * blend_) continue;
+    const double reach = std::min(whole, limb) + 2 * blend_ + around_[i].radius;
+    if (reach < 0 || (x - around_[i].centre).squaredNorm() > reach * reach) continue;
     limb = melt(limb, blobs_[i].Distance(x), seam_);
   }
   return std::max(melt(whole, limb, blend_), floor_ - x.y());
 }
 
 Vec3 ImplicitSurface::Gradient(const Vec3& x) const {
+  // Differences along the corners of a tetrahedron: four evaluations instead of six.
   constexpr double kStep = 1e-4;
-  Vec3 gradient;
-  for (int axis = 0; axis < 3; ++axis) {
-    const Vec3 step = kStep * Vec3::Unit(axis);
-    gradient[axis] = ((*this)(x + step) - (*this)(x - step)) / (2 * kStep);
-  }
-  return gradient;
+  Vec3 gradient = Vec3::Zero();
+  for (const Vec3& corner : {Vec3(1, -1, -1), Vec3(-1, -1, 1), Vec3(-1, 1, -1), Vec3(1, 1, 1)}) gradient += corner * (*this)(x + kStep * corner);
+  return gradient / (4 * kStep);
 }
 
 Box3 ImplicitSurface::Bounds() const {

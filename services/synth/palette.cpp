@@ -22,7 +22,7 @@ constexpr geometry::Rgb8 kBird = {70, 160, 190};
 geometry::Rgb8 Face(const geometry::Vec3& x) {
   if (x.z() < 0.05) return kSkin;
   if (std::hypot(std::abs(x.x()) - 0.031, (x.y() - 1.655) * 1.6) < 0.012) return kEyes;
-  if (std::hypot(x.x(), (x.y() - 1.588) * 2.6) < 0.021) return kLips;
+  if (std::hypot(x.x(), (x.y() - 1.586) * 2.8) < 0.020) return kLips;
   return kSkin;
 }
 

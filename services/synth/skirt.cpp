@@ -191,10 +191,10 @@ std::vector<Vec3> PlaceSkirt(const SkirtShape& shape, const Pose& pose) {
     const double angle = Angle(column);
     const Vec3 waist = pose[kPelvis] * WaistAtRest(angle);
     const Vec3 hip = pose[kPelvis] * HipAtRest(angle);
-    // Over the hips the cloth bulges like the body below it.
+    // Over the hips the cloth bulges a little, like the body below it.
     for (std::int32_t row = 0; row <= kYokeRows; ++row) {
       const double s = static_cast<double>(row) / kYokeRows;
-      const double bulge = std::sin(0.5 * std::numbers::pi * s);
+      const double bulge = s + 0.10 * std::sin(std::numbers::pi * s);
       middle[at(row, column)] = waist + Vec3(bulge * (hip - waist).x(), s * (hip - waist).y(), bulge * (hip - waist).z());
     }
     Vec3 place = hip;
