@@ -26,14 +26,16 @@ struct IndicatorSummary {
   double seconds_solve = 0;                // CPU time of the Poisson solve alone
   double distance_mean_m = 0;              // of the input points to the surface; a point farther than 5 spacings counts as 5
   std::int64_t points_dropped_shells = 0;  // points whose shell was too small or too little supported to keep
-  std::int64_t points_far = 0;             // points more than 2 spacings from the surface: on parts too thin for the grid, or stray
+  std::int64_t points_far = 0;             // points more than 2 spacings from the surface: on parts too thin for the grid, stray, or inside
 };
 
 /// The shape that oriented points describe: a Poisson indicator (paper, section 3; Kazhdan 2006; spectral solve as in Peng 2021),
 /// isovalue at the points' mean, meshed closed. INVALID_ARGUMENT when the points cannot bound a volume, with the reason.
 absl::StatusOr<Shape> ShapeFromPoints(const geometry::OrientedPoints& points, const IndicatorOptions& options, IndicatorSummary* summary);
 
-/// The shape a closed mesh bounds. A mesh that is not closed, or crosses itself, is resampled to points and goes the way of points.
+/// The shape a mesh bounds. A closed mesh that does not cross itself is taken as it is. One without border that crosses itself, or has edges with
+/// four triangles, is cut anew from a grid where its winding number is positive: overlapping parts are united. One with holes is resampled to
+/// points and goes the way of points. INVALID_ARGUMENT when it encloses no volume, faces inward, or is broken.
 absl::StatusOr<Shape> ShapeFromMesh(const geometry::TriangleMesh& mesh, const IndicatorOptions& options, IndicatorSummary* summary);
 
 }  // namespace vorocast::cvt

@@ -1,0 +1,4 @@
+# SPDX-License-Identifier: AGPL-3.0-or-later
+# CGAL's exact distances are the truth that surfaces are held to; captures lie beside the source tree.
+target_link_libraries(tests_unit_workers_cvt PRIVATE CGAL::CGAL)
+target_compile_definitions(tests_unit_workers_cvt PRIVATE VOROCAST_SOURCE_DIR="${CMAKE_SOURCE_DIR}")
