@@ -16,10 +16,10 @@ using geometry::Mat3;
 using geometry::Quat;
 using geometry::Vec3;
 
-constexpr std::size_t kCornersMax = 12;        // more cost time and change nothing that is seen
-constexpr double kExtentMin = 0.001;           // metres; thinner is not simulated
-constexpr double kMassFloor = 0.01;            // of the mean mass
-constexpr double kInertiaRatioMin = 0.1;       // smallest principal moment by the largest: needles and plates would spin wildly
+constexpr std::size_t kCornersMax = 12;   // more cost time and change nothing that is seen
+constexpr double kExtentMin = 0.001;      // metres; thinner is not simulated
+constexpr double kMassFloor = 0.01;       // of the mean mass
+constexpr double kInertiaRatioMin = 0.1;  // smallest principal moment by the largest: needles and plates would spin wildly
 
 /// The cell's corners relative to its centroid, each once, in ascending order of their index.
 std::vector<Vec3> Corners(const Cells& cells, std::size_t c) {
@@ -155,7 +155,8 @@ CellShape MakeCellShape(const Cells& cells, std::size_t c, double mass, double s
 
 std::vector<CellShape> MakeCellShapes(const Cells& cells, const CellSettings& settings) {
   const double shrink = kHullMargin + settings.shrink_m;
-  const double total_volume = std::accumulate(cells.volume.begin(), cells.volume.end(), 0.0, [](double sum, double v) { return sum + std::max(v, 0.0); });
+  const double total_volume =
+      std::accumulate(cells.volume.begin(), cells.volume.end(), 0.0, [](double sum, double v) { return sum + std::max(v, 0.0); });
   const double smallest_volume = std::max(kMassFloor * total_volume / static_cast<double>(cells.size()), kExtentMin * kExtentMin * kExtentMin);
   std::vector<CellShape> shapes;
   shapes.reserve(cells.size());

@@ -14,11 +14,11 @@ inline constexpr double kHullMargin = 0.0001;
 
 /// A cell as a rigid body. The body frame has its origin at the cell's centroid and the hull's principal axes of inertia.
 struct CellShape {
-  std::vector<geometry::Vec3> hull;      // corners in the body frame, metres; at least 4, at most 12; has volume
-  geometry::Quat cell_from_body;         // the cell frame has the same origin and the template's axes (tracked_motion.h)
-  double mass = 0;                       // kg
-  geometry::Vec3 inertia;                // kg m², about the body's axes
-  double radius = 0;                     // of the sphere around the centroid that holds hull and margin
+  std::vector<geometry::Vec3> hull;  // corners in the body frame, metres; at least 4, at most 12; has volume
+  geometry::Quat cell_from_body;     // the cell frame has the same origin and the template's axes (tracked_motion.h)
+  double mass = 0;                   // kg
+  geometry::Vec3 inertia;            // kg m², about the body's axes
+  double radius = 0;                 // of the sphere around the centroid that holds hull and margin
 };
 
 /// One shape a cell. The hull of the cell's polyhedron with each face moved inwards by margin + shrink, thinned out to at most 12 corners.

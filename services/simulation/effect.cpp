@@ -24,7 +24,8 @@ absl::StatusOr<std::string> ReadText(const std::filesystem::path& path) {
   std::error_code error;
   const std::uintmax_t size = std::filesystem::file_size(path, error);
   if (error) return absl::NotFoundError(fmt::format("effect file {}: {}", path.string(), error.message()));
-  if (size > kLargestFile) return absl::InvalidArgumentError(fmt::format("effect file {}: {} bytes, an effect has at most {}", path.string(), size, kLargestFile));
+  if (size > kLargestFile)
+    return absl::InvalidArgumentError(fmt::format("effect file {}: {} bytes, an effect has at most {}", path.string(), size, kLargestFile));
   std::ifstream file(path, std::ios::binary);
   std::string text{std::istreambuf_iterator<char>(file), {}};
   if (!file) return absl::UnavailableError(fmt::format("effect file {}: cannot be read", path.string()));
@@ -47,7 +48,8 @@ absl::StatusOr<json> NormaliseEffect(const json& effect) {
 }
 
 absl::StatusOr<json> ParseEffect(std::string_view text) {
-  if (text.size() > kLargestFile) return absl::InvalidArgumentError(fmt::format("effect: {} bytes, an effect has at most {}", text.size(), kLargestFile));
+  if (text.size() > kLargestFile)
+    return absl::InvalidArgumentError(fmt::format("effect: {} bytes, an effect has at most {}", text.size(), kLargestFile));
   json effect;
   try {
     effect = json::parse(text);
@@ -63,7 +65,8 @@ absl::StatusOr<json> LoadEffect(const std::string& name_or_path) {
   }
   std::error_code error;
   if (!std::filesystem::exists(name_or_path, error)) {
-    return absl::NotFoundError(fmt::format("effect \"{}\": no such file, and none of the shipped effects ({})", name_or_path, fmt::join(ShippedEffects(), ", ")));
+    return absl::NotFoundError(
+        fmt::format("effect \"{}\": no such file, and none of the shipped effects ({})", name_or_path, fmt::join(ShippedEffects(), ", ")));
   }
   ASSIGN_OR_RETURN(const std::string text, ReadText(name_or_path));
   auto effect = ParseEffect(text);

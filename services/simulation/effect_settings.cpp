@@ -108,7 +108,8 @@ PendulumSettings ReadPendulum(Fields& fields) {
 ObjectSettings ReadObject(const json& object) {
   Fields fields(object);
   const auto kind = fields.Get<std::string>("kind");
-  if (kind == "box") return BoxSettings{.placement = ReadPlacement(fields), .size_m = fields.Vector("size_m"), .rotation_deg = fields.Vector("rotation_deg")};
+  if (kind == "box")
+    return BoxSettings{.placement = ReadPlacement(fields), .size_m = fields.Vector("size_m"), .rotation_deg = fields.Vector("rotation_deg")};
   if (kind == "sphere") return SphereSettings{.placement = ReadPlacement(fields), .radius_m = fields.Get<double>("radius_m")};
   VOROCAST_CHECK(kind == "pendulum");
   return ReadPendulum(fields);

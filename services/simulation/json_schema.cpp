@@ -82,7 +82,8 @@ class Checker {
   absl::StatusOr<json> CheckNumber(const json& schema, const json& value, const std::string& path) const {
     if (!value.is_number()) return Wrong(schema, value, path);
     const double number = value.get<double>();
-    const bool above = schema.contains("exclusiveMinimum") ? number > schema["exclusiveMinimum"].get<double>() : number >= schema.at("minimum").get<double>();
+    const bool above =
+        schema.contains("exclusiveMinimum") ? number > schema["exclusiveMinimum"].get<double>() : number >= schema.at("minimum").get<double>();
     if (!above || !(number <= schema.at("maximum").get<double>())) return Wrong(schema, value, path);
     return json(number == 0 ? 0.0 : number);  // −0 and 0 are one effect, and have one key.
   }
@@ -92,7 +93,8 @@ class Checker {
     const std::string& text = value.get_ref<const std::string&>();
     std::size_t characters = 0;
     for (const char c : text) characters += (static_cast<unsigned char>(c) & 0xC0) != 0x80;
-    if (characters < schema.value("minLength", std::size_t{0}) || characters > schema.at("maxLength").get<std::size_t>()) return Wrong(schema, value, path);
+    if (characters < schema.value("minLength", std::size_t{0}) || characters > schema.at("maxLength").get<std::size_t>())
+      return Wrong(schema, value, path);
     return value;
   }
 

@@ -99,7 +99,8 @@ class Placer {
   absl::StatusOr<SceneBody> operator()(const BoxSettings& box) const {
     SceneBody body = Place(box.placement, origin_);
     const Vec3 turn = box.rotation_deg;
-    body.start.rotation = TurnAbout(Vec3::UnitZ(), Radians(turn.z())) * TurnAbout(Vec3::UnitY(), Radians(turn.y())) * TurnAbout(Vec3::UnitX(), Radians(turn.x()));
+    body.start.rotation =
+        TurnAbout(Vec3::UnitZ(), Radians(turn.z())) * TurnAbout(Vec3::UnitY(), Radians(turn.y())) * TurnAbout(Vec3::UnitX(), Radians(turn.x()));
     body.box_half = 0.5 * box.size_m;
     body.mesh = BoxMesh(*body.box_half);
     return body;
@@ -133,7 +134,8 @@ class Placer {
     body.body_from_object = {Quat::Identity(), pendulum.arm_m * Vec3::UnitY()};
     const auto arm = ArmMesh(std::min(kArmRadius, 0.5 * pendulum.radius_m), std::max(pendulum.arm_m - pendulum.radius_m, 0.01));
     body.mesh = Join(arm, SphereMesh(pendulum.radius_m), -pendulum.arm_m * Vec3::UnitY());
-    const PendulumSwing swing(Radians(pendulum.start_angle_deg), effect_.gravity_m_s2, EquivalentLength(pendulum.arm_m, pendulum.radius_m), pendulum.hit_time_s);
+    const PendulumSwing swing(Radians(pendulum.start_angle_deg), effect_.gravity_m_s2, EquivalentLength(pendulum.arm_m, pendulum.radius_m),
+                              pendulum.hit_time_s);
     // Heading 90° is +z, so it turns the x axis about −y.
     body.hinge = SceneBody::Hinge{.world_from_pivot = {TurnAbout(Vec3::UnitY(), -heading), pivot}, .arm = pendulum.arm_m, .swing = swing};
     body.start_s = std::max(swing.start_time(), 0.0);

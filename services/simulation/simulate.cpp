@@ -12,8 +12,8 @@
 namespace vorocast::simulation {
 namespace {
 
-constexpr double kSlowRate = 60;         // steps a second while nothing moves fast
-constexpr double kTravelMax = 0.01;      // metres in one step, before the steps get shorter: less than half a cell
+constexpr double kSlowRate = 60;     // steps a second while nothing moves fast
+constexpr double kTravelMax = 0.01;  // metres in one step, before the steps get shorter: less than half a cell
 constexpr std::size_t kInstantsMax = 1000000;
 
 /// How many equal steps lead to the next stored frame: as few as keep fast things from passing through cells.

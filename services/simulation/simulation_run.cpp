@@ -17,9 +17,9 @@ using geometry::Quat;
 using geometry::Rigid3;
 using geometry::Vec3;
 
-constexpr double kGoneDistance = 100;          // metres from the middle of the first frame
-constexpr double kNearPad = 0.005;             // metres, beyond what moves within a step
-constexpr int kStepsUntilOut = 8;              // a recalled cell stays in the world so long after the last foreign thing left
+constexpr double kGoneDistance = 100;           // metres from the middle of the first frame
+constexpr double kNearPad = 0.005;              // metres, beyond what moves within a step
+constexpr int kStepsUntilOut = 8;               // a recalled cell stays in the world so long after the last foreign thing left
 constexpr double kUndisturbedDeviation = 1e-6;  // metres, and radians
 constexpr double kUndisturbedSpeed = 1e-4;      // metres a second, and radians a second
 
@@ -31,7 +31,8 @@ bool IsFinite(const BodyState& body) {
 
 }  // namespace
 
-SimulationRun::SimulationRun(const Effect& effect, const TrackedMotion& motion, const Scene& scene, const std::vector<CellShape>& shapes, double first_dt)
+SimulationRun::SimulationRun(const Effect& effect, const TrackedMotion& motion, const Scene& scene, const std::vector<CellShape>& shapes,
+                             double first_dt)
     : effect_(effect),
       motion_(motion),
       scene_(scene),
@@ -169,7 +170,8 @@ void SimulationRun::RecallCells(double dt) {
     const Vec3 turn = RotationVector(cell.body.rotation * next_target_[c].rotation.conjugate());
     const Vec3 next_turn = RotationVector(next_target_[c].rotation * target_[c].rotation.conjugate()) / dt;
     const bool in_place = (cell.body.position - next_target_[c].translation).norm() < kUndisturbedDeviation && turn.norm() < kUndisturbedDeviation;
-    const bool at_rest = (cell.body.velocity - next_velocity).norm() < kUndisturbedSpeed && (cell.body.angular_velocity - next_turn).norm() < kUndisturbedSpeed;
+    const bool at_rest =
+        (cell.body.velocity - next_velocity).norm() < kUndisturbedSpeed && (cell.body.angular_velocity - next_turn).norm() < kUndisturbedSpeed;
     if (in_place && at_rest) {
       cell.body.position = next_target_[c].translation;
       cell.body.rotation = next_target_[c].rotation;

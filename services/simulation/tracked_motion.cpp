@@ -72,14 +72,15 @@ absl::Status CheckTake(const TrackedTake& take) {
   RETURN_IF_ERROR(CheckCells(take.model.cells));
   const std::vector<std::int32_t>& frames = take.patches.frames;
   if (frames.empty()) return absl::InvalidArgumentError("tracked take: it has no frames");
-  if (std::ranges::adjacent_find(frames, std::greater_equal<>()) != frames.end()) return absl::InvalidArgumentError("tracked take: frame numbers do not ascend");
+  if (std::ranges::adjacent_find(frames, std::greater_equal<>()) != frames.end())
+    return absl::InvalidArgumentError("tracked take: frame numbers do not ascend");
   if (!(take.frames_per_second > 0) || !std::isfinite(take.frames_per_second)) {
     return absl::InvalidArgumentError(fmt::format("tracked take: {} frames a second", take.frames_per_second));
   }
   const std::size_t poses = frames.size() * take.cell_count();
   if (take.cell_rotation.size() != poses || take.cell_translation.size() != poses) {
-    return absl::InvalidArgumentError(fmt::format("tracked take: {} rotations and {} translations where {} frames of {} cells need {}", take.cell_rotation.size(),
-                                                  take.cell_translation.size(), frames.size(), take.cell_count(), poses));
+    return absl::InvalidArgumentError(fmt::format("tracked take: {} rotations and {} translations where {} frames of {} cells need {}",
+                                                  take.cell_rotation.size(), take.cell_translation.size(), frames.size(), take.cell_count(), poses));
   }
   for (std::size_t i = 0; i < poses; ++i) {
     if (!take.cell_translation[i].allFinite() || !take.cell_rotation[i].allFinite() || !(take.cell_rotation[i].norm() > 0.5F)) {

@@ -29,7 +29,7 @@ class TrackedMotion {
 
  private:
   std::size_t cell_count_;
-  std::vector<double> frame_time_;         // [F]
+  std::vector<double> frame_time_;          // [F]
   std::vector<geometry::Rigid3> at_frame_;  // [F*n]
 };
 

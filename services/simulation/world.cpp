@@ -5,6 +5,7 @@
 #include <btBulletDynamicsCommon.h>
 
 #include "services/base/check.h"
+#include "services/simulation/near_pairs.h"
 
 namespace vorocast::simulation {
 namespace {
@@ -76,7 +77,7 @@ struct ObjectBody {
 struct World::Bodies {
   btDefaultCollisionConfiguration configuration;
   btCollisionDispatcher dispatcher{&configuration};
-  btDbvtBroadphase broadphase;
+  NearPairBroadphase broadphase;
   btSequentialImpulseConstraintSolver solver;
   btDiscreteDynamicsWorld world{&dispatcher, &broadphase, &solver, &configuration};
   std::unique_ptr<btStaticPlaneShape> ground_shape;
@@ -103,7 +104,6 @@ World::World(double gravity, std::optional<double> ground_height, const Surface&
   b.world.setGravity(b.gravity);
   b.world.setForceUpdateAllAabbs(false);
   b.world.getDispatchInfo().m_useContinuous = false;
-  b.world.getDispatchInfo().m_deterministicOverlappingPairs = true;
   b.world.getSolverInfo().m_numIterations = kSolverIterations;
   b.solver.setRandSeed(0);
   if (!ground_height) return;
@@ -123,7 +123,8 @@ void World::AddCells(const std::vector<CellShape>& shapes, const Surface& surfac
     for (const Vec3& corner : shape.hull) cell.shape->addPoint(LengthToBullet(corner), false);
     cell.shape->setMargin(static_cast<float>(kUnits * kHullMargin));
     cell.shape->recalcLocalAabb();
-    btRigidBody::btRigidBodyConstructionInfo info(static_cast<float>(shape.mass), nullptr, cell.shape.get(), ToBullet(kUnits * kUnits * shape.inertia));
+    btRigidBody::btRigidBodyConstructionInfo info(static_cast<float>(shape.mass), nullptr, cell.shape.get(),
+                                                  ToBullet(kUnits * kUnits * shape.inertia));
     cell.body = std::make_unique<btRigidBody>(info);
     // Gyroscopic torque is nothing to see on lumps, and a recalled cell's rotation is not Bullet's to change.
     cell.body->setFlags(BT_DISABLE_WORLD_GRAVITY);
@@ -161,8 +162,6 @@ void World::AddObject(const SceneBody& scene_body) {
 
 void World::Enter(std::size_t index, Role role, const BodyState& state) {
   CellBody& cell = bodies_->cells[index];
-  if (cell.inside) bodies_->world.removeRigidBody(cell.body.get());
-  cell.inside = true;
   PlaceBody(*cell.body, state, cell.cell_from_body);
   cell.body->clearForces();
   const bool recalled = role == Role::kRecalled;
@@ -170,8 +169,16 @@ void World::Enter(std::size_t index, Role role, const BodyState& state) {
   cell.body->setGravity(recalled ? btVector3(0, 0, 0) : bodies_->gravity);
   cell.body->forceActivationState(recalled ? DISABLE_DEACTIVATION : ACTIVE_TAG);
   cell.body->setDeactivationTime(0);
+  const int group = recalled ? kRecalledCell : kReleasedCell;
   const int others = recalled ? kReleasedCell | kObject : kGround | kRecalledCell | kReleasedCell | kObject;
-  bodies_->world.addRigidBody(cell.body.get(), recalled ? kRecalledCell : kReleasedCell, others);
+  if (cell.inside) {
+    // The broadphase asks for the filter anew at every step.
+    cell.body->getBroadphaseHandle()->m_collisionFilterGroup = group;
+    cell.body->getBroadphaseHandle()->m_collisionFilterMask = others;
+  } else {
+    bodies_->world.addRigidBody(cell.body.get(), group, others);
+    cell.inside = true;
+  }
 }
 
 void World::Leave(std::size_t index) {
