@@ -217,8 +217,11 @@ class LeaseLoop {
   }
 
   void LogEnd(const v1::Lease& lease, const v1::Finished& finished) const {
-    if (finished.has_failed())
+    if (finished.has_failed()) {
       Log(fmt::format("{}: {}: {}", lease.label(), v1::Failed::Cause_Name(finished.failed().cause()), finished.failed().message()));
+    } else {
+      Log(fmt::format("{}: done in {:.2f} s", lease.label(), finished.succeeded().seconds()));
+    }
   }
 
   void Conclude(v1::Finished finished) {

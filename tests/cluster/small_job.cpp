@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "tests/cluster/small_job.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/cluster/programs.h"
+
+namespace vorocast::cluster {
+
+const std::filesystem::path& SmallCapture() {
+  static const std::filesystem::path folder = [] {
+    const std::filesystem::path made = Scratch() / "capture";
+    const Outcome outcome = Run({"synth", made.string(), "--count", "12", "--points", "15000"});
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+    return made;
+  }();
+  return folder;
+}
+
+std::vector<std::string> RunArguments(const std::filesystem::path& folder, const std::string& effect) {
+  return {"run",        SmallCapture().string(),
+          "--out",      (folder / "out").string(),
+          "--state",    (folder / "state").string(),
+          "--workers",  "2",
+          "--cells",    "400",
+          "--patches",  "30",
+          "--template", "0",
+          "--effect",   effect};
+}
+
+const std::map<std::string, std::string>& UndisturbedDigests() {
+  static const std::map<std::string, std::string> digests = [] {
+    const std::filesystem::path folder = Scratch() / "undisturbed";
+    const Outcome outcome = Run(RunArguments(folder));
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+    return Digests(folder / "out");
+  }();
+  return digests;
+}
+
+}  // namespace vorocast::cluster

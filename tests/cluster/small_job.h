@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace vorocast::cluster {
+
+/// A made-up capture of twelve frames, made once.
+const std::filesystem::path& SmallCapture();
+
+/// `vorocast run` on it with few cells, results in FOLDER/out, state in FOLDER/state.
+std::vector<std::string> RunArguments(const std::filesystem::path& folder, const std::string& effect = "calm");
+
+/// Digests of the results of an undisturbed run, made once.
+const std::map<std::string, std::string>& UndisturbedDigests();
+
+}  // namespace vorocast::cluster
