@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "services/base/progress.h"
@@ -40,10 +41,15 @@ struct CellsPicture {
 struct SheetLayout {
   std::int32_t picture_width = 480;  // pixels; height follows from the bounds of all pictures
   std::string title;
-  double shrink = 0.92;  // cells are drawn this much of their size
+  double shrink = 0.92;       // cells are drawn this much of their size, 0 … 1
+  double azimuth_deg = 25;    // of the camera around the vertical: 0 looks along −z, 90 along −x
+  double elevation_deg = 10;  // of the camera above the horizon, −10 … 80
 };
 
-/// One sheet: pictures in reading order, one camera for all (from the bounds of all), ground with soft shadows, a label under each.
+/// One sheet: pictures in reading order, one camera for all (from the bounds of all, without the outermost thousandth of the points and
+/// cells), ground with soft shadows, a label under each. Labels and title are ASCII; other characters are drawn as '?'.
+/// The same bytes for the same input, single-threaded. INVALID_ARGUMENT for no pictures, nothing to draw, values that are not finite, arrays
+/// of different lengths, a sheet of more than 200 million pixels.
 absl::StatusOr<Image> RenderSheet(const std::vector<PointsPicture>& pictures, const SheetLayout& layout, const base::Progress& progress);
 absl::StatusOr<Image> RenderSheet(const std::vector<CellsPicture>& pictures, const SheetLayout& layout, const base::Progress& progress);
 

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "services/rendering/camera.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <tuple>
+#include <utility>
+
+namespace vorocast::rendering {
+namespace {
+
+using geometry::Vec3f;
+
+constexpr double kTrimmed = 0.001;
+constexpr float kMargin = 0.07F;      // of the window's larger side, on every side
+constexpr float kEyeDistance = 3.2F;  // in units of the extent: a long lens, as for portraits
+constexpr double kHeightMin = 0.5;    // in units of the width
+constexpr double kHeightMax = 1.6;
+
+/// The values' range without the trimmed part of each end.
+std::pair<float, float> TrimmedRange(std::vector<float> values) {
+  const auto trimmed = static_cast<std::ptrdiff_t>(kTrimmed * static_cast<double>(values.size()));
+  std::ranges::nth_element(values, values.begin() + trimmed);
+  const float low = values[static_cast<std::size_t>(trimmed)];
+  std::ranges::nth_element(values, values.end() - 1 - trimmed);
+  return {low, *(values.end() - 1 - trimmed)};
+}
+
+}  // namespace
+
+absl::Status Settle(Bounds& bounds) {
+  if (bounds.centres.empty()) return absl::InvalidArgumentError("there is nothing to draw: every picture is empty");
+  Vec3f low;
+  Vec3f high;
+  std::vector<float> values(bounds.centres.size());
+  for (const Vec3f& c : bounds.centres) {
+    if (!c.allFinite()) return absl::InvalidArgumentError("a position is not finite");
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    std::ranges::transform(bounds.centres, values.begin(), [axis](const Vec3f& c) { return c[axis]; });
+    std::tie(low[axis], high[axis]) = TrimmedRange(values);
+  }
+  const float slack = 0.01F * (high - low).maxCoeff();  // nearly all of the trimmed ones are no strays
+  Bounds kept;
+  kept.ground = high.y();
+  for (std::size_t i = 0; i < bounds.centres.size(); ++i) {
+    const Vec3f& c = bounds.centres[i];
+    if (((c - low).array() < -slack).any() || ((c - high).array() > slack).any()) continue;
+    kept.centres.push_back(c);
+    kept.radii.push_back(bounds.radii[i]);
+    kept.ground = std::min(kept.ground, c.y() - bounds.radii[i]);
+  }
+  kept.extent = std::max((high - low).maxCoeff(), 2 * *std::ranges::max_element(kept.radii));
+  bounds = std::move(kept);
+  return absl::OkStatus();
+}
+
+Camera FrameBounds(const Bounds& bounds, const Framing& framing) {
+  const auto azimuth = static_cast<float>(framing.azimuth_deg * std::numbers::pi / 180);
+  const auto elevation = static_cast<float>(framing.elevation_deg * std::numbers::pi / 180);
+  Vec3f low = bounds.centres[0];
+  Vec3f high = low;
+  for (const Vec3f& c : bounds.centres) {
+    low = low.cwiseMin(c);
+    high = high.cwiseMax(c);
+  }
+  Camera camera;
+  const Vec3f back(std::sin(azimuth) * std::cos(elevation), std::sin(elevation), std::cos(azimuth) * std::cos(elevation));
+  camera.forward = -back;
+  camera.right = Vec3f::UnitY().cross(back).normalized();
+  camera.up = back.cross(camera.right);
+  camera.eye = (low + high) / 2 + kEyeDistance * std::max(bounds.extent, 1e-3F) * back;
+
+  // The window: extents of all spheres on the plane at distance 1. A sphere's own size there is radius / depth, near enough this far off.
+  float left = 1e9F, right = -1e9F, bottom = 1e9F, top = -1e9F;
+  for (std::size_t i = 0; i < bounds.centres.size(); ++i) {
+    const Vec3f arm = bounds.centres[i] - camera.eye;
+    const float depth = std::max(arm.dot(camera.forward), 1e-3F);
+    const float x = arm.dot(camera.right) / depth;
+    const float y = arm.dot(camera.up) / depth;
+    const float r = bounds.radii[i] / depth;
+    left = std::min(left, x - r), right = std::max(right, x + r);
+    bottom = std::min(bottom, y - r), top = std::max(top, y + r);
+  }
+  const float margin = kMargin * std::max(right - left, top - bottom);
+  left -= margin, right += margin, bottom -= margin, top += margin;
+  // Too flat or too tall a window grows on both sides.
+  const double ratio = static_cast<double>((top - bottom) / (right - left));
+  if (ratio < kHeightMin) {
+    const float missing = static_cast<float>(kHeightMin) * (right - left) - (top - bottom);
+    top += missing * 0.7F, bottom -= missing * 0.3F;
+  } else if (ratio > kHeightMax) {
+    const float missing = (top - bottom) / static_cast<float>(kHeightMax) - (right - left);
+    left -= missing / 2, right += missing / 2;
+  }
+  camera.width = framing.width;
+  camera.height = static_cast<std::int32_t>(std::lround(static_cast<double>(framing.width * (top - bottom) / (right - left))));
+  camera.left = left;
+  camera.top = top;
+  camera.pixel = (right - left) / static_cast<float>(framing.width);
+  return camera;
+}
+
+}  // namespace vorocast::rendering

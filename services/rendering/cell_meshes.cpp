@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "services/base/check.h"
+#include "services/rendering/palette.h"
+#include "services/rendering/polygon.h"
+#include "services/rendering/subjects.h"
+
+namespace vorocast::rendering {
+namespace {
+
+using geometry::Cells;
+using geometry::CellState;
+using geometry::Rigid3;
+using geometry::Vec3;
+using geometry::Vec3f;
+
+const Vec3f kMetal(0.46F, 0.47F, 0.49F);
+/// The skin stands out from the cut faces within.
+constexpr float kSkinWhite = 0.18F;
+constexpr float kCutDark = 0.80F;
+
+bool IsDrawn(const CellsPicture& picture, std::size_t cell) { return picture.state.empty() || picture.state[cell] != CellState::kGone; }
+
+Rigid3 PoseOf(const CellsPicture& picture, std::size_t cell) {
+  return picture.world_from_template.empty() ? Rigid3{} : picture.world_from_template[cell];
+}
+
+Vec3f ColourOf(const CellsPicture& picture, std::size_t cell) {
+  const bool by_patch = picture.patch != nullptr && !picture.patch->empty();
+  return PatchColour(by_patch ? (*picture.patch)[cell] : static_cast<std::int32_t>(cell));
+}
+
+/// A face's corners as indices into cells.vertices.
+std::span<const std::int32_t> FaceLoop(const Cells& cells, std::int64_t face) {
+  const auto begin = static_cast<std::size_t>(cells.vertex_offset[static_cast<std::size_t>(face)]);
+  const auto end = static_cast<std::size_t>(cells.vertex_offset[static_cast<std::size_t>(face) + 1]);
+  return {cells.vertex.data() + begin, end - begin};
+}
+
+void AppendCell(const CellsPicture& picture, std::size_t cell, double shrink, Triangles& mesh) {
+  const Cells& cells = *picture.cells;
+  const Rigid3 pose = PoseOf(picture, cell);
+  const Vec3f colour = ColourOf(picture, cell);
+  const Vec3 centroid = cells.centroid[cell];
+  std::vector<Vec3> corners;
+  for (std::int64_t face = cells.face_offset[cell]; face < cells.face_offset[cell + 1]; ++face) {
+    corners.clear();
+    for (std::int32_t v : FaceLoop(cells, face))
+      corners.push_back(pose * (centroid + shrink * (cells.vertices[static_cast<std::size_t>(v)] - centroid)));
+    const bool is_skin = cells.neighbour[static_cast<std::size_t>(face)] < 0;
+    const Vec3f tint = is_skin ? Vec3f((1 - kSkinWhite) * colour + Vec3f::Constant(kSkinWhite)) : Vec3f(kCutDark * colour);
+    for (const auto& triangle : Triangulate(corners)) {
+      for (std::int32_t i : triangle) mesh.corners.push_back(corners[static_cast<std::size_t>(i)].cast<float>());
+      mesh.colours.push_back(tint);
+    }
+  }
+}
+
+Triangles MakeObject(const geometry::TriangleMesh& object, const Rigid3& world_from_object) {
+  Triangles mesh;
+  mesh.metal = true;
+  for (const auto& triangle : object.triangles) {
+    for (std::int32_t v : triangle) mesh.corners.push_back((world_from_object * object.vertices[static_cast<std::size_t>(v)]).cast<float>());
+    mesh.colours.push_back(kMetal);
+  }
+  return mesh;
+}
+
+}  // namespace
+
+std::vector<Triangles> MakeMeshes(const CellsPicture& picture, double shrink) {
+  std::vector<Triangles> meshes(1);
+  for (std::size_t cell = 0; cell < picture.cells->size(); ++cell) {
+    if (IsDrawn(picture, cell)) AppendCell(picture, cell, shrink, meshes[0]);
+  }
+  for (const auto& [object, world_from_object] : picture.objects) meshes.push_back(MakeObject(*object, world_from_object));
+  return meshes;
+}
+
+absl::Status CheckPicture(const CellsPicture& picture) {
+  VOROCAST_CHECK(picture.cells != nullptr);
+  const std::size_t n = picture.cells->size();
+  if (picture.patch != nullptr && !picture.patch->empty() && picture.patch->size() != n) {
+    return absl::InvalidArgumentError(fmt::format("{} cells have {} patch numbers", n, picture.patch->size()));
+  }
+  if (!picture.world_from_template.empty() && picture.world_from_template.size() != n) {
+    return absl::InvalidArgumentError(fmt::format("{} cells have {} poses", n, picture.world_from_template.size()));
+  }
+  if (!picture.state.empty() && picture.state.size() != n)
+    return absl::InvalidArgumentError(fmt::format("{} cells have {} states", n, picture.state.size()));
+  for (std::size_t cell = 0; cell < picture.world_from_template.size(); ++cell) {
+    const Rigid3& pose = picture.world_from_template[cell];
+    if (!pose.translation.allFinite() || !pose.rotation.coeffs().allFinite()) {
+      return absl::InvalidArgumentError(fmt::format("the pose of cell {} is not finite", cell));
+    }
+  }
+  return absl::OkStatus();
+}
+
+void AddBounds(const CellsPicture& picture, Bounds& bounds) {
+  const Cells& cells = *picture.cells;
+  for (std::size_t cell = 0; cell < cells.size(); ++cell) {
+    if (!IsDrawn(picture, cell)) continue;
+    double squared = 0;
+    for (std::int64_t face = cells.face_offset[cell]; face < cells.face_offset[cell + 1]; ++face) {
+      for (std::int32_t v : FaceLoop(cells, face))
+        squared = std::max(squared, (cells.vertices[static_cast<std::size_t>(v)] - cells.centroid[cell]).squaredNorm());
+    }
+    bounds.centres.push_back((PoseOf(picture, cell) * cells.centroid[cell]).cast<float>());
+    bounds.radii.push_back(static_cast<float>(std::sqrt(squared)));
+  }
+}
+
+}  // namespace vorocast::rendering

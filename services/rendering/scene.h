@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "services/base/status.h"
+#include "services/geometry/vector.h"
+
+namespace vorocast::rendering {
+
+/// Metres, y up, linear RGB.
+struct Disc {
+  geometry::Vec3f centre;
+  geometry::Vec3f normal;  // unit
+  float radius = 0;
+  geometry::Vec3f colour;
+};
+
+/// Triangles that share no vertices: three consecutive corners each, counter-clockwise seen from outside.
+struct Triangles {
+  std::vector<geometry::Vec3f> corners;  // [3t]
+  std::vector<geometry::Vec3f> colours;  // [t]
+  bool metal = false;
+};
+
+struct Ray {
+  geometry::Vec3f origin;
+  geometry::Vec3f direction;  // unit
+  float reach = 0;            // metres
+};
+
+struct Hit {
+  float distance = 0;
+  geometry::Vec3f normal;  // unit, outward as its surface says
+  geometry::Vec3f colour;
+  float clearance = 0;  // secondary rays start this far above the surface, so that they miss its own roughness
+  bool metal = false;
+};
+
+/// What rays meet, in an Embree tree built for one thread and one instruction set: the same answers on every machine.
+class Scene {
+ public:
+  /// INTERNAL when Embree cannot be had or runs out of memory.
+  static absl::StatusOr<Scene> Build(const std::vector<Disc>& discs, const std::vector<Triangles>& meshes);
+  Scene(Scene&&) noexcept;
+  Scene& operator=(Scene&&) noexcept;
+  ~Scene();
+
+  std::optional<Hit> Intersect(const Ray& ray) const;
+  bool Occludes(const Ray& ray) const;
+
+ private:
+  struct Tree;
+  explicit Scene(std::unique_ptr<Tree> tree);
+  std::unique_ptr<Tree> tree_;
+};
+
+}  // namespace vorocast::rendering
