@@ -11,23 +11,32 @@ namespace {
 
 using geometry::Vec3f;
 
-float SquaredDistanceToSegment(const Vec3f& p, const Vec3f& a, const Vec3f& ab) {
-  const float length = ab.squaredNorm();
-  const float t = length > 0 ? std::clamp((p - a).dot(ab) / length, 0.0F, 1.0F) : 0.0F;
-  return (p - a - t * ab).squaredNorm();
-}
-
+/// By the region of the triangle's plane the point lies over: a corner, an edge or the inside (Ericson, Real-Time Collision Detection, 5.1.5).
 float SquaredDistanceToTriangle(const Vec3f& p, const Vec3f& a, const Vec3f& b, const Vec3f& c) {
   const Vec3f ab = b - a;
-  const Vec3f bc = c - b;
-  const Vec3f ca = a - c;
-  const Vec3f n = ab.cross(-ca);
-  const float area = n.squaredNorm();
-  if (area > 0 && n.dot(ab.cross(p - a)) >= 0 && n.dot(bc.cross(p - b)) >= 0 && n.dot(ca.cross(p - c)) >= 0) {
-    const float height = n.dot(p - a);
-    return height * height / area;
-  }
-  return std::min({SquaredDistanceToSegment(p, a, ab), SquaredDistanceToSegment(p, b, bc), SquaredDistanceToSegment(p, c, ca)});
+  const Vec3f ac = c - a;
+  const Vec3f ap = p - a;
+  const float ab_ap = ab.dot(ap);
+  const float ac_ap = ac.dot(ap);
+  if (ab_ap <= 0 && ac_ap <= 0) return ap.squaredNorm();
+  const Vec3f bp = p - b;
+  const float ab_bp = ab.dot(bp);
+  const float ac_bp = ac.dot(bp);
+  if (ab_bp >= 0 && ac_bp <= ab_bp) return bp.squaredNorm();
+  const float over_ab = ab_ap * ac_bp - ab_bp * ac_ap;
+  if (over_ab <= 0 && ab_ap >= 0 && ab_bp <= 0) return (ap - ab * (ab_ap / (ab_ap - ab_bp))).squaredNorm();
+  const Vec3f cp = p - c;
+  const float ab_cp = ab.dot(cp);
+  const float ac_cp = ac.dot(cp);
+  if (ac_cp >= 0 && ab_cp <= ac_cp) return cp.squaredNorm();
+  const float over_ac = ab_cp * ac_ap - ab_ap * ac_cp;
+  if (over_ac <= 0 && ac_ap >= 0 && ac_cp <= 0) return (ap - ac * (ac_ap / (ac_ap - ac_cp))).squaredNorm();
+  const float over_bc = ab_bp * ac_cp - ab_cp * ac_bp;
+  const float to_c = ac_bp - ab_bp;
+  const float to_b = ab_cp - ac_cp;
+  if (over_bc <= 0 && to_c >= 0 && to_b >= 0) return (bp - (c - b) * (to_c / (to_c + to_b))).squaredNorm();
+  const float whole = over_ab + over_ac + over_bc;
+  return (ap - ab * (over_ac / whole) - ac * (over_ab / whole)).squaredNorm();
 }
 
 /// The triangles of a surface by the grid cell they were cut from, corners in grid units.
@@ -38,56 +47,78 @@ class TriangleGrid {
     for (std::size_t c = 1; c < first_.size(); ++c) first_[c] += first_[c - 1];
     corners_.reserve(surface.mesh.vertices.size());
     for (const geometry::Vec3& x : surface.mesh.vertices) corners_.push_back(frame.ToGrid(x));
+    spheres_.reserve(surface.mesh.triangles.size());
+    for (const auto& t : surface.mesh.triangles) {
+      const auto at = [&](std::size_t v) -> const Vec3f& { return corners_[static_cast<std::size_t>(t[v])]; };
+      const Vec3f centre = (at(0) + at(1) + at(2)) / 3;
+      const float squared = std::max({(at(0) - centre).squaredNorm(), (at(1) - centre).squaredNorm(), (at(2) - centre).squaredNorm()});
+      spheres_.push_back({centre, std::sqrt(squared)});
+    }
   }
 
   struct Nearest {
-    float squared = std::numeric_limits<float>::infinity();
+    float distance = std::numeric_limits<float>::infinity();
     std::int32_t triangle = -1;
   };
 
-  void Visit(const Vec3f& p, const std::array<std::int32_t, 3>& low, const std::array<std::int32_t, 3>& high, Nearest& nearest) const {
-    std::array<std::int32_t, 3> from;
-    std::array<std::int32_t, 3> to;
-    for (std::size_t a = 0; a < 3; ++a) {
-      from[a] = std::clamp(low[a], 0, frame_.nodes[a] - 1);
-      to[a] = std::clamp(high[a], 0, frame_.nodes[a] - 1);
-    }
-    for (std::int32_t i = from[0]; i <= to[0]; ++i) {
-      for (std::int32_t j = from[1]; j <= to[1]; ++j) {
+  void VisitTriangle(const Vec3f& p, std::int32_t triangle, Nearest& nearest) const {
+    // Most candidates are too far away for their exact distance to matter.
+    const Sphere& around = spheres_[static_cast<std::size_t>(triangle)];
+    const float bound = nearest.distance + around.radius;
+    if ((p - around.centre).squaredNorm() >= bound * bound) return;
+    const auto& corner = surface_.mesh.triangles[static_cast<std::size_t>(triangle)];
+    const auto at = [&](std::size_t v) -> const Vec3f& { return corners_[static_cast<std::size_t>(corner[v])]; };
+    const float distance = std::sqrt(SquaredDistanceToTriangle(p, at(0), at(1), at(2)));
+    if (distance < nearest.distance) nearest = {distance, triangle};
+  }
+
+  /// The triangles of the cells that the ball around p touches, which shrinks to the distance found (and kSlack) on the way.
+  void VisitBall(const Vec3f& p, float radius, Nearest& nearest) const {
+    const std::int32_t first_i = Cell(0, p[0] - radius);
+    const std::int32_t last_i = Cell(0, p[0] + radius);
+    const std::int32_t first_j = Cell(1, p[1] - radius);
+    const std::int32_t last_j = Cell(1, p[1] + radius);
+    for (std::int32_t i = first_i; i <= last_i; ++i) {
+      for (std::int32_t j = first_j; j <= last_j; ++j) {
+        const float reach = std::min(radius, nearest.distance + kSlack);
+        const float aside = Outside(i, p[0]) * Outside(i, p[0]) + Outside(j, p[1]) * Outside(j, p[1]);
+        if (aside > reach * reach) continue;
+        const float half = std::sqrt(reach * reach - aside);
         // Cells along the last axis follow one another, and so do their triangles.
-        const std::int32_t end = first_[frame_.Index(i, j, to[2]) + 1];
-        for (std::int32_t t = first_[frame_.Index(i, j, from[2])]; t < end; ++t) {
-          const auto& corner = surface_.mesh.triangles[static_cast<std::size_t>(t)];
-          const auto at = [&](std::size_t v) -> const Vec3f& { return corners_[static_cast<std::size_t>(corner[v])]; };
-          const float squared = SquaredDistanceToTriangle(p, at(0), at(1), at(2));
-          if (squared < nearest.squared) nearest = {squared, t};
-        }
+        const std::int32_t end = first_[frame_.Index(i, j, Cell(2, p[2] + half)) + 1];
+        for (std::int32_t t = first_[frame_.Index(i, j, Cell(2, p[2] - half))]; t < end; ++t) VisitTriangle(p, t, nearest);
       }
     }
   }
 
+  /// How far a triangle may reach out of the cell it was cut from.
+  static constexpr float kSlack = 0.75F;
+
  private:
+  struct Sphere {
+    Vec3f centre;
+    float radius;
+  };
+
+  std::int32_t Cell(std::size_t axis, float x) const { return std::clamp(static_cast<std::int32_t>(std::floor(x)), 0, frame_.nodes[axis] - 1); }
+  /// Distance of a coordinate from the cell [i, i + 1].
+  static float Outside(std::int32_t i, float x) { return std::max({0.0F, static_cast<float>(i) - x, x - static_cast<float>(i + 1)}); }
+
   const GridFrame& frame_;
   const GridSurface& surface_;
   std::vector<std::int32_t> first_;
   std::vector<Vec3f> corners_;
+  std::vector<Sphere> spheres_;  // around each triangle
 };
 
-/// First the eight cells whose common corner is nearest to the point, then rings of cells until what was found cannot be beaten.
-TriangleGrid::Nearest FindNearest(const TriangleGrid& grid, const Vec3f& p) {
+/// `guess` is a triangle that is likely to be near, or −1. Most points lie so near the surface that half a cell around them settles it.
+TriangleGrid::Nearest FindNearest(const TriangleGrid& grid, const Vec3f& p, std::int32_t guess) {
   TriangleGrid::Nearest nearest;
-  std::array<std::int32_t, 3> cell;
-  std::array<std::int32_t, 3> corner;
-  for (int a = 0; a < 3; ++a) {
-    cell[static_cast<std::size_t>(a)] = static_cast<std::int32_t>(std::floor(p[a]));
-    corner[static_cast<std::size_t>(a)] = static_cast<std::int32_t>(std::round(p[a]));
-  }
-  grid.Visit(p, {corner[0] - 1, corner[1] - 1, corner[2] - 1}, corner, nearest);
-  if (nearest.squared <= 0.25F) return nearest;
-  for (std::int32_t ring = 1; ring <= static_cast<std::int32_t>(kFarthestCells); ++ring) {
-    grid.Visit(p, {cell[0] - ring, cell[1] - ring, cell[2] - ring}, {cell[0] + ring, cell[1] + ring, cell[2] + ring}, nearest);
-    if (nearest.squared <= static_cast<float>(ring * ring)) break;
-  }
+  if (guess >= 0) grid.VisitTriangle(p, guess, nearest);
+  grid.VisitBall(p, 0.5F, nearest);
+  if (nearest.distance <= 0.5F) return nearest;
+  grid.VisitBall(p, 1.5F, nearest);
+  if (nearest.distance + TriangleGrid::kSlack > 1.5F) grid.VisitBall(p, kFarthestCells + TriangleGrid::kSlack, nearest);
   return nearest;
 }
 
@@ -98,10 +129,12 @@ PointSurfaceDistances DistancesToSurface(const SortedPoints& points, const GridF
   PointSurfaceDistances found;
   found.distance.reserve(points.points().size());
   found.triangle.reserve(points.points().size());
+  std::int32_t last_triangle = -1;
   for (const GridPoint& p : points.points()) {
-    const TriangleGrid::Nearest nearest = FindNearest(grid, p.u);
-    const bool near = nearest.squared <= kFarthestCells * kFarthestCells;
-    found.distance.push_back(near ? std::sqrt(nearest.squared) : kFarthestCells);
+    const TriangleGrid::Nearest nearest = FindNearest(grid, p.u, last_triangle);
+    last_triangle = nearest.triangle;
+    const bool near = nearest.distance <= kFarthestCells;
+    found.distance.push_back(near ? nearest.distance : kFarthestCells);
     found.triangle.push_back(near ? nearest.triangle : -1);
   }
   return found;
