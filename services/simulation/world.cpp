@@ -5,6 +5,7 @@
 #include <btBulletDynamicsCommon.h>
 
 #include "services/base/check.h"
+#include "services/simulation/cell_collision.h"
 #include "services/simulation/near_pairs.h"
 
 namespace vorocast::simulation {
@@ -56,7 +57,7 @@ void SetSurface(btRigidBody& body, const Surface& surface) {
 }
 
 struct CellBody {
-  std::unique_ptr<btConvexHullShape> shape;
+  std::unique_ptr<CellHull> shape;
   std::unique_ptr<btRigidBody> body;
   Quat cell_from_body;
   bool inside = false;
@@ -76,6 +77,7 @@ struct ObjectBody {
 
 struct World::Bodies {
   btDefaultCollisionConfiguration configuration;
+  CellCollision::Factory cell_collisions;
   btCollisionDispatcher dispatcher{&configuration};
   NearPairBroadphase broadphase;
   btSequentialImpulseConstraintSolver solver;
@@ -102,6 +104,7 @@ World::World(double gravity, std::optional<double> ground_height, const Surface&
   Bodies& b = *bodies_;
   b.gravity = LengthToBullet(Vec3(0, -gravity, 0));
   b.world.setGravity(b.gravity);
+  b.dispatcher.registerCollisionCreateFunc(CONVEX_HULL_SHAPE_PROXYTYPE, CONVEX_HULL_SHAPE_PROXYTYPE, &b.cell_collisions);
   b.world.setForceUpdateAllAabbs(false);
   b.world.getDispatchInfo().m_useContinuous = false;
   b.world.getSolverInfo().m_numIterations = kSolverIterations;
@@ -119,10 +122,7 @@ void World::AddCells(const std::vector<CellShape>& shapes, const Surface& surfac
   for (const CellShape& shape : shapes) {
     CellBody cell;
     cell.cell_from_body = shape.cell_from_body;
-    cell.shape = std::make_unique<btConvexHullShape>();
-    for (const Vec3& corner : shape.hull) cell.shape->addPoint(LengthToBullet(corner), false);
-    cell.shape->setMargin(static_cast<float>(kUnits * kHullMargin));
-    cell.shape->recalcLocalAabb();
+    cell.shape = std::make_unique<CellHull>(shape, static_cast<float>(kUnits));
     btRigidBody::btRigidBodyConstructionInfo info(static_cast<float>(shape.mass), nullptr, cell.shape.get(),
                                                   ToBullet(kUnits * kUnits * shape.inertia));
     cell.body = std::make_unique<btRigidBody>(info);
