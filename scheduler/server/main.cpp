@@ -1,2 +1,124 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
-int main() { return 1; }
+#include <signal.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include <fmt/format.h>
+#include <spdlog/sinks/basic_file_sink.h>
+#include <spdlog/sinks/stdout_sinks.h>
+#include <spdlog/spdlog.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "scheduler/fleet/local_fleet.h"
+#include "scheduler/server/scheduler_server.h"
+
+namespace vorocast::server {
+namespace {
+
+struct Options {
+  std::string state;
+  std::string listen;
+  std::int32_t workers = 0;
+  bool simulation = false;
+};
+
+constexpr std::size_t kUnixPathMax = 107;
+
+/// The same at every start on one folder, so that workers that outlived a scheduler find the next one.
+std::string StableAddress(const std::filesystem::path& state) {
+  const std::string socket = (state / "scheduler.sock").string();
+  if (socket.size() <= kUnixPathMax) return "unix:" + socket;
+  std::ifstream file(state / "scheduler.json");
+  const auto announced = nlohmann::json::parse(file, nullptr, false);
+  if (announced.is_object() && announced.value("address", "").starts_with("127.0.0.1:")) return announced["address"];
+  return "127.0.0.1:0";
+}
+
+absl::Status Announce(const std::filesystem::path& state, const std::string& address) {
+  const std::filesystem::path path = state / "scheduler.json";
+  const std::filesystem::path temporary = state / "scheduler.json.new";
+  std::ofstream(temporary) << nlohmann::json{{"address", address}, {"pid", getpid()}}.dump() << "\n";
+  std::error_code error;
+  std::filesystem::rename(temporary, path, error);
+  if (error) return absl::UnavailableError(fmt::format("{}: cannot be written: {}", path.string(), error.message()));
+  return absl::OkStatus();
+}
+
+absl::Status StartLog(const std::filesystem::path& state) {
+  std::error_code error;
+  std::filesystem::create_directories(state / "logs", error);
+  if (error) return absl::UnavailableError(fmt::format("{}: cannot be created: {}", (state / "logs").string(), error.message()));
+  try {
+    auto file = std::make_shared<spdlog::sinks::basic_file_sink_mt>((state / "logs" / "scheduler.log").string());
+    auto terminal = std::make_shared<spdlog::sinks::stderr_sink_mt>();
+    auto logger = std::make_shared<spdlog::logger>("scheduler", spdlog::sinks_init_list{file, terminal});
+    logger->set_pattern("%Y-%m-%dT%H:%M:%S.%e%z %l %v");
+    logger->flush_on(spdlog::level::info);
+    spdlog::set_default_logger(std::move(logger));
+  } catch (const spdlog::spdlog_ex& problem) {
+    return absl::UnavailableError(problem.what());
+  }
+  return absl::OkStatus();
+}
+
+absl::Status Serve(const Options& options, const sigset_t& stop_signals) {
+  const std::filesystem::path state = std::filesystem::absolute(options.state).lexically_normal();
+  RETURN_IF_ERROR(StartLog(state));
+  const std::string listen = options.listen.empty() ? StableAddress(state) : options.listen;
+  ASSIGN_OR_RETURN(std::unique_ptr<SchedulerServer> server, SchedulerServer::Start({.state = state, .listen = listen}));
+  std::unique_ptr<fleet::LocalFleet> fleet;
+  if (options.workers > 0 || options.simulation) {
+    const std::filesystem::path programs = std::filesystem::read_symlink("/proc/self/exe").parent_path();
+    fleet::FleetOptions members{
+        .state = state,
+        .members =
+            fleet::Members({.programs = programs, .scheduler = server->address(), .workers = options.workers, .simulation = options.simulation})};
+    ASSIGN_OR_RETURN(fleet, fleet::LocalFleet::Start(std::move(members)));
+  }
+  RETURN_IF_ERROR(Announce(state, server->address()));
+  spdlog::info("serving: address={} state={} pid={}", server->address(), state.string(), getpid());
+  int signal = 0;
+  sigwait(&stop_signals, &signal);
+  spdlog::info("stopping: signal={}", signal);
+  fleet.reset();
+  server.reset();
+  std::error_code ignored;
+  if (!StableAddress(state).starts_with("127.")) std::filesystem::remove(state / "scheduler.json", ignored);
+  spdlog::info("stopped");
+  return absl::OkStatus();
+}
+
+int Main(int argc, char** argv) {
+  // Before any thread starts, so that all of them leave these signals to sigwait.
+  sigset_t stop_signals;
+  sigemptyset(&stop_signals);
+  sigaddset(&stop_signals, SIGTERM);
+  sigaddset(&stop_signals, SIGINT);
+  pthread_sigmask(SIG_BLOCK, &stop_signals, nullptr);
+  signal(SIGPIPE, SIG_IGN);
+
+  CLI::App app("Vorocast's scheduler: splits takes into tasks and leases them to workers");
+  Options options;
+  app.add_option("--state", options.state, "Folder for the database, the artifacts and the logs; created if need be")->required();
+  app.add_option("--listen", options.listen, "HOST:PORT or unix:/path (default: a socket in the state folder)");
+  app.add_option("--workers", options.workers, "Workers to run on this machine")->check(CLI::Range(0, 1024));
+  app.add_flag("--simulation", options.simulation, "Run a simulation service on this machine too");
+  CLI11_PARSE(app, argc, argv);
+
+  const absl::Status status = Serve(options, stop_signals);
+  if (status.ok()) return 0;
+  fmt::print(stderr, "vorocast-scheduler: {}\n", std::string(status.message()));
+  return 1;
+}
+
+}  // namespace
+}  // namespace vorocast::server
+
+int main(int argc, char** argv) { return vorocast::server::Main(argc, argv); }

@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "scheduler/server/engine.h"
+
+#include <chrono>
+#include <cstdlib>
+
+#include <spdlog/spdlog.h>
+
+#include "scheduler/core/step.h"
+#include "services/base/check.h"
+
+namespace vorocast::server {
+namespace {
+
+constexpr std::size_t kQueueMax = 100'000;
+constexpr std::size_t kTurnMax = 4'000;  // commands a turn: answers do not wait for an endless queue
+constexpr auto kTick = std::chrono::milliseconds(50);
+constexpr int kCommitAttempts = 30;
+constexpr auto kCommitPause = std::chrono::seconds(1);
+
+void Log(const core::Record& record) {
+  if (const auto* failed = std::get_if<core::TaskFailed>(&record)) {
+    spdlog::warn("task failed: job={} task=\"{}\" cause=\"{}\" message=\"{}\"", failed->job, failed->task, core::Name(failed->cause),
+                 failed->message);
+  }
+}
+
+}  // namespace
+
+absl::Time MonotonicNow() {
+  const auto since = std::chrono::steady_clock::now().time_since_epoch();
+  return absl::UnixEpoch() + absl::FromChrono(since);
+}
+
+void Turn::Apply(core::Event event) {
+  core::Effects effects = core::Step(state_, std::move(event), now_);
+  for (core::Record& record : effects.records) {
+    Log(record);
+    records_.emplace_back(std::move(record));
+  }
+  std::move(effects.messages.begin(), effects.messages.end(), std::back_inserter(messages_));
+  std::move(effects.look_ups.begin(), effects.look_ups.end(), std::back_inserter(look_ups_));
+  changed_jobs_.insert(effects.changed_jobs.begin(), effects.changed_jobs.end());
+}
+
+void Engine::Prepare(const Command& command) {
+  VOROCAST_CHECK(!thread_.joinable());
+  Turn turn(state_, MonotonicNow());
+  command(turn);
+  VOROCAST_CHECK(turn.messages_.empty());
+  Commit(turn.records_);
+  for (const auto& action : turn.after_) action();
+  std::move(turn.look_ups_.begin(), turn.look_ups_.end(), std::back_inserter(early_look_ups_));
+}
+
+void Engine::Start(EngineAdapters adapters) {
+  adapters_ = std::move(adapters);
+  if (!early_look_ups_.empty()) adapters_.look_up(std::exchange(early_look_ups_, {}));
+  thread_ = std::thread([this] { Run(); });
+}
+
+void Engine::Stop() {
+  {
+    const std::lock_guard lock(mutex_);
+    stopping_ = true;
+  }
+  wake_.notify_all();
+  if (thread_.joinable()) thread_.join();
+}
+
+bool Engine::Submit(Command command) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (stopping_ || commands_.size() >= kQueueMax) return false;
+    commands_.push_back(std::move(command));
+  }
+  wake_.notify_one();
+  return true;
+}
+
+void Engine::Enqueue(Command command) {
+  {
+    const std::lock_guard lock(mutex_);
+    commands_.push_back(std::move(command));
+  }
+  wake_.notify_one();
+}
+
+void Engine::Run() {
+  auto next_tick = std::chrono::steady_clock::now();
+  while (true) {
+    std::vector<Command> batch;
+    {
+      std::unique_lock lock(mutex_);
+      wake_.wait_until(lock, next_tick, [this] { return stopping_ || !commands_.empty(); });
+      if (stopping_ && commands_.empty()) return;
+      while (!commands_.empty() && batch.size() < kTurnMax) {
+        batch.push_back(std::move(commands_.front()));
+        commands_.pop_front();
+      }
+    }
+    Turn turn(state_, MonotonicNow());
+    for (const Command& command : batch) command(turn);
+    // After the commands: a sign of life that waits in the queue must be seen before its lease is judged.
+    if (std::chrono::steady_clock::now() >= next_tick) {
+      if (batch.size() < kTurnMax) turn.Apply(core::Tick{});
+      next_tick = std::chrono::steady_clock::now() + kTick;
+    }
+    adapters_.changed(turn, turn.changed_jobs_);
+    Finish(turn);
+  }
+}
+
+void Engine::Finish(Turn& turn) {
+  Commit(turn.records_);
+  for (const auto& action : turn.after_) action();
+  for (core::Message& message : turn.messages_) adapters_.send(std::move(message));
+  if (!turn.look_ups_.empty()) adapters_.look_up(std::move(turn.look_ups_));
+}
+
+void Engine::Commit(const std::vector<store::Record>& records) {
+  if (records.empty()) return;
+  for (int attempt = 1;; ++attempt) {
+    const absl::Status status = store_.Append(records);
+    if (status.ok()) return;
+    spdlog::error("commit failed: attempt={} records={} error=\"{}\"", attempt, records.size(), std::string(status.message()));
+    if (attempt == kCommitAttempts || absl::IsDataLoss(status)) {
+      spdlog::critical("giving up: start the scheduler again once its state folder can be written; workers go on meanwhile");
+      spdlog::shutdown();
+      std::_Exit(EXIT_FAILURE);
+    }
+    std::this_thread::sleep_for(kCommitPause);
+  }
+}
+
+}  // namespace vorocast::server

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "scheduler/server/fetch_call.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+
+#include <fmt/format.h>
+
+#include "services/rpc/limits.h"
+#include "services/rpc/status.h"
+
+namespace vorocast::server {
+
+FetchCall::~FetchCall() {
+  if (file_ >= 0) close(file_);
+}
+
+void FetchCall::Refuse(const absl::Status& status) { Finish(rpc::ToGrpc(status)); }
+
+void FetchCall::Send(const std::filesystem::path& path, const std::string& sha256) {
+  disk_.Run([this, path, sha256] {
+    if (const absl::Status status = Open(path, sha256); !status.ok()) return Refuse(status);
+    WriteNext();
+  });
+}
+
+absl::Status FetchCall::Open(const std::filesystem::path& path, const std::string& sha256) {
+  file_ = open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  struct stat info {};
+  if (file_ < 0 || fstat(file_, &info) != 0) {
+    return absl::DataLossError(fmt::format("{}: the result is on record but cannot be read: {}; retry the job", path.string(), std::strerror(errno)));
+  }
+  left_ = info.st_size;
+  chunk_.set_size(info.st_size);
+  chunk_.set_sha256(sha256);
+  return absl::OkStatus();
+}
+
+void FetchCall::WriteNext() {
+  if (left_ == 0 && !first_) return Finish(grpc::Status::OK);
+  std::string& bytes = *chunk_.mutable_data();
+  bytes.resize(static_cast<std::size_t>(std::min(left_, rpc::kChunkBytesMax)));
+  for (std::size_t at = 0; at < bytes.size();) {
+    const ssize_t count = read(file_, bytes.data() + at, bytes.size() - at);
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) return Refuse(absl::DataLossError("the result cannot be read to its end"));
+    at += static_cast<std::size_t>(count);
+  }
+  left_ -= static_cast<std::int64_t>(bytes.size());
+  first_ = false;
+  StartWrite(&chunk_);
+}
+
+void FetchCall::OnWriteDone(bool ok) {
+  if (!ok) return Refuse(absl::CancelledError("the client has gone"));
+  chunk_.Clear();
+  disk_.Run([this] { WriteNext(); });
+}
+
+}  // namespace vorocast::server

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "scheduler/server/job_request.h"
+
+#include <algorithm>
+#include <cstdint>
+
+#include <fmt/format.h>
+
+#include "services/simulation/effect.h"
+
+namespace vorocast::server {
+namespace {
+
+constexpr std::size_t kEffectBytesMax = 1 << 20;
+constexpr std::size_t kUserMax = 100;
+constexpr std::int32_t kCellsMax = 200'000;
+constexpr std::int32_t kWindowMax = 1'000;
+constexpr std::int32_t kPriorityMax = 1'000'000;
+constexpr std::int32_t kFrameNumberMax = 10'000'000;
+
+absl::Status CheckRange(std::int32_t value, std::int32_t low, std::int32_t high, std::string_view field) {
+  if (value >= low && value <= high) return absl::OkStatus();
+  return absl::InvalidArgumentError(fmt::format("{} is {}; it must be from {} to {}", field, value, low, high));
+}
+
+absl::StatusOr<nlohmann::json> EffectOf(const std::string& text) {
+  if (text.empty()) return nlohmann::json();
+  if (text.size() > kEffectBytesMax)
+    return absl::InvalidArgumentError(fmt::format("effect_json has {} bytes; at most {} are taken", text.size(), kEffectBytesMax));
+  const auto json = nlohmann::json::parse(text, nullptr, false);
+  if (json.is_discarded()) return absl::InvalidArgumentError("effect_json is not JSON");
+  auto effect = simulation::NormaliseEffect(json);
+  if (!effect.ok()) return base::Annotate(effect.status(), "effect_json");
+  return effect;
+}
+
+}  // namespace
+
+absl::StatusOr<plan::JobSpec> SpecOf(const v1::SubmitJobRequest& request) {
+  plan::JobSpec spec;
+  if (request.user().size() > kUserMax) return absl::InvalidArgumentError(fmt::format("user has more than {} characters", kUserMax));
+  RETURN_IF_ERROR(CheckRange(request.cells(), 0, kCellsMax, "cells"));
+  RETURN_IF_ERROR(CheckRange(request.iterations(), INT32_MIN, 1000, "iterations"));
+  RETURN_IF_ERROR(CheckRange(request.template_frame(), INT32_MIN, kFrameNumberMax, "template_frame"));
+  RETURN_IF_ERROR(CheckRange(request.window_frames(), 0, kWindowMax, "window_frames"));
+  RETURN_IF_ERROR(CheckRange(request.interpolated_max(), INT32_MIN, kFrameNumberMax, "interpolated_max"));
+  RETURN_IF_ERROR(CheckRange(request.priority(), -kPriorityMax, kPriorityMax, "priority"));
+  if (request.cells() > 0) spec.tessellate.cells = request.cells();
+  if (request.iterations() >= 0) spec.tessellate.iterations = request.iterations();
+  if (!request.indicator().empty()) spec.tessellate.indicator = request.indicator();
+  if (!request.start().empty()) spec.tessellate.start = request.start();
+  RETURN_IF_ERROR(CheckRange(request.patches(), 0, spec.tessellate.cells, "patches"));
+  spec.patches = request.patches() > 0 ? request.patches() : std::clamp(spec.tessellate.cells / 25, 1, 200);
+  spec.template_frame = std::max(request.template_frame(), -1);
+  if (request.window_frames() > 0) spec.window_frames = request.window_frames();
+  spec.overlap_frames = std::min(spec.overlap_frames, spec.window_frames - 1);
+  spec.interpolated_max = std::max(request.interpolated_max(), -1);
+  spec.sheets = request.sheets();
+  ASSIGN_OR_RETURN(spec.effect, EffectOf(request.effect_json()));
+  // The tasks' own checks know the choices.
+  tasks::TessellateOptions checked;
+  RETURN_IF_ERROR(tasks::FromJson(tasks::ToJson(spec.tessellate), checked));
+  return spec;
+}
+
+void SetCapture(const store::SequenceOpened& sequence, plan::JobSpec& spec) {
+  spec.tessellate.capture = {.metres_per_unit = sequence.metres_per_unit, .up = sequence.up};
+  spec.frames_per_second = sequence.frames_per_second;
+}
+
+}  // namespace vorocast::server

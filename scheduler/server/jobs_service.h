@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include "proto/jobs.grpc.pb.h"
+#include "scheduler/server/catalogue.h"
+#include "scheduler/server/disk_threads.h"
+#include "scheduler/server/engine.h"
+#include "scheduler/server/fetch_call.h"
+#include "scheduler/server/watch_call.h"
+#include "services/storage/artifact_store.h"
+
+namespace vorocast::server {
+
+/// proto/jobs.proto.
+class JobsService final : public v1::Jobs::CallbackService {
+ public:
+  /// All must outlive the service.
+  JobsService(Engine& engine, Catalogue& catalogue, Watchers& watchers, const storage::ArtifactStore& artifacts, DiskThreads& disk)
+      : engine_(engine), catalogue_(catalogue), watchers_(watchers), artifacts_(artifacts), disk_(disk) {}
+
+  grpc::ServerUnaryReactor* Submit(grpc::CallbackServerContext* context, const v1::SubmitJobRequest* request, v1::Job* reply) override;
+  grpc::ServerUnaryReactor* Get(grpc::CallbackServerContext* context, const v1::JobRequest* request, v1::Job* reply) override;
+  grpc::ServerUnaryReactor* List(grpc::CallbackServerContext* context, const v1::ListJobsRequest* request, v1::ListJobsReply* reply) override;
+  grpc::ServerWriteReactor<v1::Job>* Watch(grpc::CallbackServerContext* context, const v1::JobRequest* request) override;
+  grpc::ServerUnaryReactor* Explain(grpc::CallbackServerContext* context, const v1::ExplainRequest* request, v1::ExplainReply* reply) override;
+  grpc::ServerUnaryReactor* Cancel(grpc::CallbackServerContext* context, const v1::JobRequest* request, v1::Job* reply) override;
+  grpc::ServerUnaryReactor* Retry(grpc::CallbackServerContext* context, const v1::JobRequest* request, v1::Job* reply) override;
+  grpc::ServerWriteReactor<v1::FetchChunk>* Fetch(grpc::CallbackServerContext* context, const v1::FetchRequest* request) override;
+
+ private:
+  /// Fills `reply` with the job as it is now.
+  absl::Status Show(Turn& turn, const std::string& id, v1::Job& reply) const;
+
+  Engine& engine_;
+  Catalogue& catalogue_;
+  Watchers& watchers_;
+  const storage::ArtifactStore& artifacts_;
+  DiskThreads& disk_;
+};
+
+}  // namespace vorocast::server

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "scheduler/server/scheduler_server.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include "scheduler/server/captures_service.h"
+#include "scheduler/server/dispatch_service.h"
+#include "scheduler/server/jobs_service.h"
+#include "scheduler/server/look_up_thread.h"
+#include "scheduler/store/sqlite_store.h"
+#include "scheduler/store/state_lock.h"
+#include "services/rpc/server.h"
+
+namespace vorocast::server {
+namespace {
+
+constexpr int kDiskThreads = 4;
+constexpr absl::Duration kStopGrace = absl::Seconds(1);
+
+}  // namespace
+
+/// In the order they are made; the destructor ends them in the order that none is used after its end.
+struct SchedulerServer::Parts {
+  Parts(store::StateLock taken, std::unique_ptr<store::Store> opened, storage::ArtifactStore folder)
+      : lock(std::move(taken)), store(std::move(opened)), artifacts(std::move(folder)) {}
+
+  store::StateLock lock;
+  std::unique_ptr<store::Store> store;
+  storage::ArtifactStore artifacts;
+  Engine engine{*store};
+  Catalogue catalogue;
+  Watchers watchers{catalogue};
+  std::unique_ptr<DiskThreads> disk = std::make_unique<DiskThreads>(kDiskThreads);
+  CapturesService captures{engine, catalogue, artifacts, *disk};
+  JobsService jobs{engine, catalogue, watchers, artifacts, *disk};
+  DispatchService dispatch{engine, std::filesystem::absolute(artifacts.root()).lexically_normal().string()};
+  std::unique_ptr<LookUpThread> look_ups;
+  std::unique_ptr<rpc::Server> server;
+
+  absl::Status Restore();
+  void StartEngine();
+  ~Parts();
+};
+
+absl::Status SchedulerServer::Parts::Restore() {
+  ASSIGN_OR_RETURN(store::Snapshot snapshot, store->Load());
+  spdlog::info("restored: sequences={} jobs={} runs={}", snapshot.sequences.size(), snapshot.jobs.size(), snapshot.runs.size());
+  absl::Status status;
+  engine.Prepare([&](Turn& turn) { status = catalogue.Restore(turn, std::move(snapshot)); });
+  return status;
+}
+
+void SchedulerServer::Parts::StartEngine() {
+  look_ups = std::make_unique<LookUpThread>(*store, artifacts, [this](std::vector<core::LookUpAnswered> answers) {
+    engine.Enqueue([answers = std::move(answers)](Turn& turn) {
+      for (const core::LookUpAnswered& answer : answers) turn.Apply(answer);
+    });
+  });
+  engine.Start({.send = [this](core::Message message) { dispatch.Send(std::move(message)); },
+                .look_up = [this](std::vector<core::LookUp> asked) { look_ups->Ask(std::move(asked)); },
+                .changed = [this](Turn& turn, const std::set<std::string>& changed) { watchers.Changed(turn, changed); }});
+}
+
+SchedulerServer::Parts::~Parts() {
+  if (server) {
+    engine.Enqueue([this](Turn& turn) { turn.After([this] { watchers.EndAll(absl::UnavailableError("the scheduler is stopping")); }); });
+    dispatch.EndStreams();
+    server->Stop(kStopGrace);
+    server.reset();
+  }
+  engine.Stop();
+  look_ups.reset();
+  disk.reset();
+}
+
+SchedulerServer::SchedulerServer(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
+SchedulerServer::~SchedulerServer() = default;
+
+const std::string& SchedulerServer::address() const { return parts_->server->address(); }
+
+absl::StatusOr<std::unique_ptr<SchedulerServer>> SchedulerServer::Start(const SchedulerOptions& options) {
+  std::error_code error;
+  std::filesystem::create_directories(options.state, error);
+  if (error) return absl::UnavailableError(fmt::format("{}: cannot be created: {}", options.state.string(), error.message()));
+  ASSIGN_OR_RETURN(store::StateLock lock, store::StateLock::Take(options.state));
+  ASSIGN_OR_RETURN(std::unique_ptr<store::Store> store, store::OpenSqliteStore(options.state / "scheduler.db"));
+  ASSIGN_OR_RETURN(storage::ArtifactStore artifacts, storage::ArtifactStore::Open(options.state));
+  auto parts = std::make_unique<Parts>(std::move(lock), std::move(store), std::move(artifacts));
+  RETURN_IF_ERROR(parts->Restore());
+  parts->StartEngine();
+  ASSIGN_OR_RETURN(parts->server, rpc::StartServer({.listen = options.listen, .services = {&parts->captures, &parts->jobs, &parts->dispatch}}));
+  return std::unique_ptr<SchedulerServer>(new SchedulerServer(std::move(parts)));
+}
+
+}  // namespace vorocast::server

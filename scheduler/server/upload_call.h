@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+
+#include <grpcpp/support/server_callback.h>
+
+#include "proto/capture.pb.h"
+#include "scheduler/server/disk_threads.h"
+#include "services/base/digest.h"
+#include "services/base/status.h"
+#include "services/storage/artifact_store.h"
+
+namespace vorocast::server {
+
+/// Checks a blob's name as a client states it. INVALID_ARGUMENT names the field.
+absl::StatusOr<base::Digest> CheckBlob(const v1::Blob& blob);
+
+/// One blob on its way into the store. Owns itself until the call is over; a broken call leaves nothing behind.
+class UploadCall final : public grpc::ServerReadReactor<v1::UploadChunk> {
+ public:
+  UploadCall(const storage::ArtifactStore& artifacts, DiskThreads& disk);
+  ~UploadCall() override;
+
+  void OnReadDone(bool ok) override;
+  void OnCancel() override {}
+  void OnDone() override { delete this; }
+
+ private:
+  absl::Status Begin(const v1::Blob& blob);
+  absl::Status Write(const std::string& bytes);
+  absl::Status Publish();
+  void Take(bool ok);
+
+  const storage::ArtifactStore& artifacts_;
+  DiskThreads& disk_;
+  v1::UploadChunk chunk_;
+  v1::Blob blob_;
+  base::Digest digest_;
+  std::filesystem::path temporary_;
+  int file_ = -1;
+  std::int64_t written_ = 0;
+};
+
+}  // namespace vorocast::server
