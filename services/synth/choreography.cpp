@@ -16,7 +16,7 @@ using geometry::Vec3;
 constexpr double kTurn = 2 * std::numbers::pi;
 constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kStepCycle_s = 1.3;  // left and right step
-constexpr double kSwingShare = 0.40;  // of the cycle that one foot is in the air
+constexpr double kSwingShare = 0.44;  // of the cycle that one foot is in the air
 constexpr double kHalfStance_m = 0.085;
 
 /// sin of a motion that repeats every `period_s`, `phase` in turns.
@@ -79,9 +79,9 @@ Foot FootAt(bool left, double seconds) {
   const double air = std::pow(std::sin(std::numbers::pi * u), 2);
   const Quat facing = Heading(heading);
   const Vec3& rest_ankle = RestJoints()[left ? kLeftFoot : kRightFoot];
-  const double kick = 0.13 * (0.6 + 0.4 * Wave(seconds, 2 * kStepCycle_s));
+  const double kick = 0.095 * (0.6 + 0.4 * Wave(seconds, 2 * kStepCycle_s));
   const Vec3 ankle = from + Ease(u) * (to - from) + Vec3(0, rest_ankle.y() + 0.085 * air, 0) + facing * Vec3(0, 0, kick * air);
-  return {ankle, facing * About(Vec3::UnitX(), 0.40 * air)};
+  return {ankle, facing * About(Vec3::UnitX(), 0.34 * air)};
 }
 
 void PoseLeg(bool left, double seconds, Pose& pose) {
@@ -154,8 +154,8 @@ void PoseTrunk(double seconds, Pose& pose) {
 }  // namespace
 
 Stance StanceAt(double seconds) {
-  const double around = kTurn * seconds / 7.5;
-  return {{0.16 * std::sin(around), 0, 0.16 * std::cos(around)}, 0.42 * seconds + 0.40 * Wave(seconds, 5.2)};
+  const double around = kTurn * seconds / 9.0;
+  return {{0.16 * std::sin(around), 0, 0.16 * std::cos(around)}, 0.40 * seconds + 0.36 * Wave(seconds, 5.2)};
 }
 
 Pose PoseAt(double seconds) {

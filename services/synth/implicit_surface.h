@@ -34,7 +34,6 @@ class ImplicitSurface {
   double blend_m() const { return blend_; }
 
   double operator()(const geometry::Vec3& x) const;
-  geometry::Vec3 Gradient(const geometry::Vec3& x) const;
   geometry::Box3 Bounds() const;
 
  private:

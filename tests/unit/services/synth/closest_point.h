@@ -29,14 +29,19 @@ class ClosestPoint {
     }
   }
 
-  /// Exact up to 10 cm, and 10 cm beyond that.
-  double Distance(const geometry::Vec3& x) const {
+  struct Found {
+    double distance = 0;
+    geometry::Vec3 normal = geometry::Vec3::Zero();  // of the nearest triangle
+  };
+  /// Exact up to 10 cm; 10 cm and no normal beyond that.
+  Found Nearest(const geometry::Vec3& x) const {
     for (double reach : {0.01, 0.03, 0.10}) {
-      const double found = DistanceWithin(x, reach);
-      if (found <= reach) return found;
+      const Found found = NearestWithin(x, reach);
+      if (found.distance <= reach) return found;
     }
-    return 0.10;
+    return {0.10};
   }
+  double Distance(const geometry::Vec3& x) const { return Nearest(x).distance; }
 
  private:
   static constexpr double kCell_m = 0.02;
@@ -52,20 +57,23 @@ class ClosestPoint {
     return (static_cast<std::size_t>(k) * static_cast<std::size_t>(size_[1]) + static_cast<std::size_t>(j)) * static_cast<std::size_t>(size_[0]) +
            static_cast<std::size_t>(i);
   }
-  double DistanceWithin(const geometry::Vec3& x, double reach) const {
-    if (box_.exteriorDistance(x) > reach) return 1e9;
+  Found NearestWithin(const geometry::Vec3& x, double reach) const {
+    Found nearest{1e9};
+    if (box_.exteriorDistance(x) > reach) return nearest;
     const Eigen::Vector3i low = CellOf(x - geometry::Vec3::Constant(reach)), high = CellOf(x + geometry::Vec3::Constant(reach));
-    double nearest = 1e9;
     for (int k = low.z(); k <= high.z(); ++k) {
       for (int j = low.y(); j <= high.y(); ++j) {
         for (int i = low.x(); i <= high.x(); ++i) {
-          for (const std::size_t t : cells_[Index(i, j, k)]) nearest = std::min(nearest, ToTriangle(x, t));
+          for (const std::size_t t : cells_[Index(i, j, k)]) {
+            const Found found = ToTriangle(x, t);
+            if (found.distance < nearest.distance) nearest = found;
+          }
         }
       }
     }
     return nearest;
   }
-  double ToTriangle(const geometry::Vec3& x, std::size_t index) const {
+  Found ToTriangle(const geometry::Vec3& x, std::size_t index) const {
     const auto& t = mesh_.triangles[index];
     const geometry::Vec3 corner[3] = {mesh_.vertices[static_cast<std::size_t>(t[0])], mesh_.vertices[static_cast<std::size_t>(t[1])],
                                       mesh_.vertices[static_cast<std::size_t>(t[2])]};
@@ -78,7 +86,7 @@ class ClosestPoint {
       above = above && normal.dot(edge.cross(from)) >= 0;
       nearest = std::min(nearest, (from - std::clamp(from.dot(edge) / edge.squaredNorm(), 0.0, 1.0) * edge).norm());
     }
-    return above ? std::abs(normal.dot(x - corner[0])) : nearest;
+    return {above ? std::abs(normal.dot(x - corner[0])) : nearest, normal};
   }
 
   geometry::TriangleMesh mesh_;
