@@ -15,6 +15,8 @@ namespace {
 using geometry::Vec3;
 
 constexpr int kAttempts = 8;
+/// A winding not yet found.
+constexpr std::int32_t kUnknown = 1 << 20;
 /// Volumes of the cells must add up to the solid's to this relative error; what a contradiction breaks is far larger.
 constexpr double kVolumeTolerance = 1e-9;
 /// Cells grow by this when they turn out to reach further than was computed.
@@ -22,6 +24,9 @@ constexpr double kReachGrowth = 1.3;
 
 /// Bisectors this little beyond a point are compared exactly; all others are surely further.
 constexpr double kSafety = 1 - 1e-9;
+
+/// A plane's mark in a set of planes; several may share one, so a set says only which corners to look at.
+std::uint64_t Bit(std::int32_t plane) { return std::uint64_t{1} << (plane & 63); }
 
 std::int32_t IndexOf(std::span<const std::int32_t> names, std::int32_t name) {
   for (std::size_t p = 0; p < names.size(); ++p) {
@@ -35,17 +40,22 @@ std::int32_t IndexOf(std::span<const std::int32_t> names, std::int32_t name) {
 absl::Status ClippedCells::Evaluate(const std::vector<Vec3>& sites, ClippedComplex* complex) {
   sites_ = sites;
   complex_ = complex;
-  double shift = 1e-9 * solid_.Spacing(sites.size());
-  for (int attempt = 0; attempt < kAttempts; ++attempt) {
+  if (Attempt()) return absl::OkStatus();
+  // Either the surface crosses itself, so that the winding must be looked up, or a tie must be broken.
+  if (!rays_) {
+    rays_ = std::make_unique<XRays>(solid_.vertices, solid_.triangles);
     if (Attempt()) return absl::OkStatus();
+  }
+  double shift = 1e-9 * solid_.Spacing(sites.size());
+  for (int attempt = 0; attempt < kAttempts; ++attempt, shift *= 4) {
     base::Random random(static_cast<std::uint64_t>(attempt));
     for (std::size_t i = 0; i < sites.size(); ++i) {
       for (int a = 0; a < 3; ++a) sites_[i][a] = sites[i][a] + random.Uniform(-shift, shift);
     }
-    shift *= 4;
+    if (Attempt()) return absl::OkStatus();
   }
   return absl::InternalError(
-      fmt::format("clipping {} cells at {} triangles contradicts itself even after moving the sites; does the surface cross itself?", sites.size(),
+      fmt::format("clipping {} cells at {} triangles contradicts itself even after moving the sites; some of them may coincide", sites.size(),
                   solid_.triangles.size()));
 }
 
@@ -64,7 +74,6 @@ bool ClippedCells::Attempt() {
   for (const Moments& m : moments_) {
     volume += m.volume;
     energy_ += m.second;
-    if (!(m.volume > -kVolumeTolerance * solid_.volume)) return false;
   }
   if (!(std::abs(volume - solid_.volume) <= kVolumeTolerance * solid_.volume)) return false;
   if (complex_) {
@@ -218,36 +227,38 @@ void ClippedCells::SortCrossings() {
 }
 
 bool ClippedCells::AddFaces() {
-  side_.assign(sites_.size(), Side::kUnknown);
   const auto n = static_cast<std::int32_t>(sites_.size());
-  if (complex_) complex_->inside_begin.assign(sites_.size(), -1);
+  cell_winding_.assign(sites_.size(), kUnknown);
+  if (complex_) complex_->winding_begin.assign(sites_.size(), -1);
   for (std::int32_t i = 0; i < n; ++i) {
     if (boundary_[i] && !AddBoundaryCell(i)) return false;
   }
   // Whole cells are inside unless a boundary cell says otherwise; what it says holds for all that are connected without surface between.
   stack_.clear();
   for (std::int32_t i = 0; i < n; ++i) {
-    if (side_[i] == Side::kOutside) stack_.push_back(i);
+    if (cell_winding_[i] != 1 && cell_winding_[i] != kUnknown) stack_.push_back(i);
   }
   while (!stack_.empty()) {
     const std::int32_t i = stack_.back();
     stack_.pop_back();
     for (std::int32_t other : diagram_.names(diagram_.cell(i))) {
-      if (other < 0 || boundary_[other] || side_[other] == Side::kOutside) continue;
-      if (side_[other] == Side::kInside) return false;
-      side_[other] = Side::kOutside;
+      if (other < 0 || boundary_[other] || cell_winding_[other] == cell_winding_[i]) continue;
+      if (cell_winding_[other] != kUnknown) return false;
+      cell_winding_[other] = cell_winding_[i];
       stack_.push_back(other);
     }
   }
   for (std::int32_t i = 0; i < n; ++i) {
-    if (!boundary_[i] && side_[i] != Side::kOutside && !AddInteriorCell(i)) return false;
+    if (boundary_[i]) continue;
+    if (cell_winding_[i] == kUnknown) cell_winding_[i] = 1;
+    if (cell_winding_[i] != 0 && !AddInteriorCell(i)) return false;
   }
   return true;
 }
 
 bool ClippedCells::AddBoundaryCell(std::int32_t site) {
   for (;;) {
-    if (!CollectExits(site) || !FindInsideCorners(site)) return false;
+    if (!CollectExits(site) || !FindWinding(site)) return false;
     // A corner in the solid must be a true one: where the reach has made it, the cell goes on.
     const VoronoiDiagram::Cell& cell = diagram_.cell(site);
     bool complete = true;
@@ -256,7 +267,7 @@ bool ClippedCells::AddBoundaryCell(std::int32_t site) {
       const auto corners = diagram_.corners(cell);
       for (std::size_t v = 0; v < corners.size() && complete; ++v) {
         const auto& p = corners[v].plane;
-        complete = !inside_[v] || (names[p[0]] >= 0 && names[p[1]] >= 0 && names[p[2]] >= 0);
+        complete = winding_[v] == 0 || (names[p[0]] >= 0 && names[p[1]] >= 0 && names[p[2]] >= 0);
       }
     }
     if (complete) break;
@@ -264,10 +275,10 @@ bool ClippedCells::AddBoundaryCell(std::int32_t site) {
   }
   AddFaceEdges(site);
   if (complex_) {
-    complex_->inside_begin[site] = static_cast<std::int64_t>(complex_->inside.size());
-    complex_->inside.insert(complex_->inside.end(), inside_.begin(), inside_.end());
+    complex_->winding_begin[site] = static_cast<std::int64_t>(complex_->winding.size());
+    complex_->winding.insert(complex_->winding.end(), winding_.begin(), winding_.end());
   }
-  return MarkOutsideNeighbours(site);
+  return MarkNeighbours(site);
 }
 
 /// Finds the edge of the cell that each crossing lies on. False when there is none: surface and cell disagree.
@@ -277,11 +288,16 @@ bool ClippedCells::CollectExits(std::int32_t site) {
   const auto corners = diagram_.corners(cell);
   exits_.clear();
   net_.assign(3 * corners.size(), 0);
+  planes_at_.resize(corners.size());
+  for (std::size_t v = 0; v < corners.size(); ++v) planes_at_[v] = Bit(corners[v].plane[0]) | Bit(corners[v].plane[1]) | Bit(corners[v].plane[2]);
   for (std::int64_t c = crossing_begin_[site]; c < crossing_begin_[site + 1]; ++c) {
     const std::int32_t from = IndexOf(names, crossings_[c].from);
     const std::int32_t to = IndexOf(names, crossings_[c].to);
+    if (from < 0 || to < 0) return false;
+    const std::uint64_t both = Bit(from) | Bit(to);
     int ends = 0;
     for (std::size_t v = 0; v < corners.size() && ends < 2; ++v) {
+      if ((planes_at_[v] & both) != both) continue;
       for (int s = 0; s < 3; ++s) {
         const std::int32_t b = corners[v].plane[(s + 1) % 3];
         const std::int32_t d = corners[v].plane[(s + 2) % 3];
@@ -297,15 +313,14 @@ bool ClippedCells::CollectExits(std::int32_t site) {
   return true;
 }
 
-/// Which corners of the cell lie in the solid. Along an edge the status changes by its crossings, which fixes all corners up to
-/// "all in" or "all out" when no edge changes it; then the volume between surface and faces tells: it counts from the inside when all are out,
-/// and lacks the whole cell when all are in.
-bool ClippedCells::FindInsideCorners(std::int32_t site) {
+/// How often the surface winds around each corner of the cell. Along an edge that changes by its crossings, which fixes all corners up to a
+/// constant. Normally the winding is 0 or 1, so the constant is known as soon as one edge changes it; if none does, the volume between
+/// surface and faces tells: it counts from the inside when all corners are out, and lacks the whole cell when all are in.
+bool ClippedCells::FindWinding(std::int32_t site) {
   const VoronoiDiagram::Cell& cell = diagram_.cell(site);
   const auto corners = diagram_.corners(cell);
-  constexpr std::int32_t kUnset = 1 << 20;
-  level_.assign(corners.size(), kUnset);
-  level_[0] = 0;
+  winding_.assign(corners.size(), kUnknown);
+  winding_[0] = 0;
   stack_.assign(1, 0);
   std::int32_t lowest = 0;
   std::int32_t highest = 0;
@@ -314,37 +329,37 @@ bool ClippedCells::FindInsideCorners(std::int32_t site) {
     stack_.pop_back();
     for (int s = 0; s < 3; ++s) {
       const std::int32_t w = corners[v].next[s];
-      const std::int32_t level = level_[v] - net_[3 * v + s];
-      if (level_[w] == kUnset) {
-        level_[w] = level;
-        lowest = std::min(lowest, level);
-        highest = std::max(highest, level);
+      const std::int32_t winding = winding_[v] - net_[3 * v + s];
+      if (winding_[w] == kUnknown) {
+        winding_[w] = winding;
+        lowest = std::min(lowest, winding);
+        highest = std::max(highest, winding);
         stack_.push_back(w);
-      } else if (level_[w] != level) {
+      } else if (winding_[w] != winding) {
         return false;
       }
     }
   }
-  if (highest - lowest > 1) return false;
-  inside_.resize(corners.size());
-  if (highest > lowest) {
-    for (std::size_t v = 0; v < corners.size(); ++v) inside_[v] = level_[v] > lowest ? 1 : 0;
-    return true;
+  std::int32_t first = -lowest;
+  if (rays_) {
+    first = rays_->Winding(sites_[site] + corners[0].position);
+  } else if (highest - lowest > 1) {
+    return false;
+  } else if (highest == lowest) {
+    const Moments before = moments_[site];
+    AddFaceEdges(site);
+    const double volume = moments_[site].volume;
+    moments_[site] = before;
+    // Next to nothing inside, or next to nothing outside: rounding may have given the sign.
+    if (std::abs(volume) < 1e-9 * solid_.volume / static_cast<double>(sites_.size())) return false;
+    first = volume < 0 ? 1 : 0;
   }
-  inside_.assign(corners.size(), 0);
-  const Moments before = moments_[site];
-  AddFaceEdges(site);
-  const double volume = moments_[site].volume;
-  moments_[site] = before;
-  const double share = solid_.volume / static_cast<double>(sites_.size());
-  bool all_inside = volume < 0;
-  if (std::abs(volume) < 1e-9 * share) all_inside = XRays(solid_.vertices, solid_.triangles).Inside(sites_[site] + corners[0].position);
-  if (all_inside) inside_.assign(corners.size(), 1);
+  for (std::int32_t& winding : winding_) winding += first;
   return true;
 }
 
 /// The parts of the cell's edges that lie in the solid, for both faces of each edge. With v the start of an edge and w its end,
-/// the part is v→w if w is inside, plus v→x for every crossing x that leaves, minus v→x for every one that enters.
+/// the part is v→w as often as w is inside, plus v→x for every crossing x that leaves, minus v→x for every one that enters.
 void ClippedCells::AddFaceEdges(std::int32_t site) {
   const VoronoiDiagram::Cell& cell = diagram_.cell(site);
   const auto planes = diagram_.planes(cell);
@@ -361,13 +376,13 @@ void ClippedCells::AddFaceEdges(std::int32_t site) {
     for (int s = 0; s < 3; ++s) {
       const std::size_t w = corners[v].next[s];
       // The same end must serve as the start for an edge's crossings and for the edge: the first, as in CollectExits.
-      if (v < w && inside_[w]) add(v, s, corners[w].position, 1);
+      if (v < w && winding_[w] != 0) add(v, s, corners[w].position, winding_[w]);
     }
   }
 }
 
-/// A face without surface that has corners outside borders on a cell that is outside, if the surface does not touch that one.
-bool ClippedCells::MarkOutsideNeighbours(std::int32_t site) {
+/// A cell that the surface does not touch lies wholly where the corners lie that it shares with one that is touched.
+bool ClippedCells::MarkNeighbours(std::int32_t site) {
   const VoronoiDiagram::Cell& cell = diagram_.cell(site);
   const auto names = diagram_.names(cell);
   const auto corners = diagram_.corners(cell);
@@ -375,9 +390,8 @@ bool ClippedCells::MarkOutsideNeighbours(std::int32_t site) {
     for (std::int32_t p : corners[v].plane) {
       const std::int32_t other = names[p];
       if (other < 0 || boundary_[other]) continue;
-      const Side side = inside_[v] ? Side::kInside : Side::kOutside;
-      if (side_[other] != Side::kUnknown && side_[other] != side) return false;
-      side_[other] = side;
+      if (cell_winding_[other] != kUnknown && cell_winding_[other] != winding_[v]) return false;
+      cell_winding_[other] = winding_[v];
     }
   }
   return true;
@@ -392,7 +406,7 @@ bool ClippedCells::AddInteriorCell(std::int32_t site) {
   const VoronoiDiagram::Cell& cell = diagram_.cell(site);
   const auto planes = diagram_.planes(cell);
   const auto corners = diagram_.corners(cell);
-  Moments& sum = moments_[site];
+  Moments sum;
   for (std::size_t v = 0; v < corners.size(); ++v) {
     for (int s = 0; s < 3; ++s) {
       const std::size_t w = corners[v].next[s];
@@ -402,6 +416,8 @@ bool ClippedCells::AddInteriorCell(std::int32_t site) {
       sum.AddEdge(left.p, left.square, right.p, right.square, corners[v].position, corners[w].position);
     }
   }
+  const double times = cell_winding_[site];
+  moments_[site] = {times * sum.volume, times * sum.first, times * sum.second};
   return true;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "services/base/status.h"
@@ -40,11 +41,13 @@ struct ClippedComplex {
   std::vector<Corner> corners;
   std::vector<EdgeCrossing> crossings;       // sorted by cell
   std::vector<std::int64_t> crossing_begin;  // [n+1]
-  std::vector<std::int64_t> inside_begin;    // [n] into `inside` for the cells at the surface; −1 for those wholly in or out
-  std::vector<std::uint8_t> inside;          // by corner of the cell in the diagram: 1 where it lies in the solid
+  std::vector<std::int64_t> winding_begin;   // [n] into `winding` for the cells at the surface; −1 for those wholly in or out
+  std::vector<std::int32_t> winding;         // by corner of the cell in the diagram: 1 where it lies in the solid, 0 outside
 };
 
-/// The Voronoi cells of sites clipped at the surface of one solid, as moments. Keeps its work (neighbours, nearest sites) from call to
+/// The Voronoi cells of sites clipped at the surface of one solid, as moments. A surface that crosses itself is taken as it winds: what it
+/// encloses twice counts twice, so that volumes still add up.
+/// Keeps its work (neighbours, nearest sites) from call to
 /// call: the next call with sites close to the last ones is faster, with the same result up to rounding.
 class ClippedCells {
  public:
@@ -76,14 +79,15 @@ class ClippedCells {
   bool AddFaces();
   bool AddBoundaryCell(std::int32_t site);
   bool CollectExits(std::int32_t site);
-  bool FindInsideCorners(std::int32_t site);
+  bool FindWinding(std::int32_t site);
   void AddFaceEdges(std::int32_t site);
-  bool MarkOutsideNeighbours(std::int32_t site);
+  bool MarkNeighbours(std::int32_t site);
   bool AddInteriorCell(std::int32_t site);
 
   const Solid& solid_;
   Neighbours neighbours_;
   VoronoiDiagram diagram_;
+  std::unique_ptr<XRays> rays_;        // asked for the winding once volumes alone have not told it
   std::vector<std::int32_t> nearest_;  // [mesh vertices]
   std::vector<Moments> moments_;
   std::vector<std::uint8_t> boundary_;
@@ -98,16 +102,15 @@ class ClippedCells {
   std::vector<std::int32_t> queued_in_;  // [n] the triangle whose queue last held the site
   std::vector<std::int32_t> queue_;
   SurfacePiece piece_;
-  enum class Side : std::uint8_t { kUnknown, kInside, kOutside };
-  std::vector<Side> side_;  // [n] of cells that the surface does not touch
-  struct Exit {             // one crossing of the edge that leaves a corner by a slot: +1 leaves the solid, −1 enters it
+  std::vector<std::int32_t> cell_winding_;  // [n] of cells that the surface does not touch
+  struct Exit {                             // one crossing of the edge that leaves a corner by a slot: +1 leaves the solid, −1 enters it
     std::int32_t corner, slot, sign;
     geometry::Vec3 position;
   };
-  std::vector<Exit> exits_;           // of the cell under way, as all below
-  std::vector<std::int32_t> net_;     // [3 corners] signs summed over an edge, in the direction in which it leaves the corner
-  std::vector<std::int32_t> level_;   // [corners] 1 + status, up to a constant
-  std::vector<std::uint8_t> inside_;  // [corners]
+  std::vector<Exit> exits_;               // of the cell under way, as all below
+  std::vector<std::int32_t> net_;         // [3 corners] signs summed over an edge, in the direction in which it leaves the corner
+  std::vector<std::uint64_t> planes_at_;  // [corners] the set of planes that meet there
+  std::vector<std::int32_t> winding_;     // [corners] how often the surface winds around: 1 inside, 0 outside
   std::vector<std::int32_t> stack_;
 };
 

@@ -23,6 +23,8 @@ void ConvexCell::Reserve(std::int32_t corners) {
   const std::size_t size = std::max<std::size_t>(64, 2 * wanted);
   for (auto* values : {&x_, &y_, &z_, &side_}) values->resize(size, 0.0);
   corners_.resize(size);
+  cut_.resize(size + 1);
+  new_corners_.resize(3 * size + 1);
 }
 
 void ConvexCell::StartAsCube(double half_side) {
@@ -122,91 +124,103 @@ bool ConvexCell::Cut(const Vec3& p, std::int32_t name) {
   }
   if (!(highest.maxCoeff() > 0)) return true;
 
-  cut_.clear();
-  for (std::int32_t i = 0; i < count_; ++i) {
-    if (side_[i] > 0) cut_.push_back(i);
-  }
-  new_corners_.clear();
-  for (std::int32_t v : cut_) {
-    const Corner& corner = corners_[v];
-    for (int s = 0; s < 3; ++s) {
-      const std::int32_t w = corner.next[s];
-      if (side_[w] > 0) continue;
-      const double t = -side_[w] / (side_[v] - side_[w]);
-      const Vec3 kept = position(w);
-      new_corners_.push_back({kept + t * (position(v) - kept), corner.plane[(s + 1) % 3], corner.plane[(s + 2) % 3], w, v, 0});
-    }
-  }
-  if (new_corners_.size() < 3) return false;
+  FindCrossedEdges();
+  if (new_count_ < 3) return false;
   planes_.push_back({p, square});
   names_.push_back(name);
   starting_at_.push_back(-1);
-  const bool linked = Link(plane_count() - 1);
-  for (const NewCorner& u : new_corners_) starting_at_[u.b] = -1;
-  if (linked) UpdateRadius();
-  return linked;
+  const bool sound = IsOneLoop();
+  if (sound) Link(plane_count() - 1);
+  for (std::int32_t m = 0; m < new_count_; ++m) starting_at_[new_corners_[m].b] = -1;
+  if (sound) UpdateRadius();
+  return sound;
+}
+
+/// Lists the corners beyond the plane, and the edges from them to others. Written without branches on the sides, which no processor can guess.
+void ConvexCell::FindCrossedEdges() {
+  const double* side = side_.data();
+  std::int32_t* cut = cut_.data();
+  std::int32_t cut_count = 0;
+  for (std::int32_t i = 0; i < count_; ++i) {
+    cut[cut_count] = i;
+    cut_count += side[i] > 0 ? 1 : 0;
+  }
+  NewCorner* corners = new_corners_.data();
+  std::int32_t new_count = 0;
+  for (std::int32_t m = 0; m < cut_count; ++m) {
+    const Corner& corner = corners_[cut[m]];
+    for (int s = 0; s < 3; ++s) {
+      NewCorner& u = corners[new_count];
+      u.cut = cut[m];
+      u.kept = corner.next[s];
+      u.b = corner.plane[(s + 1) % 3];
+      u.c = corner.plane[(s + 2) % 3];
+      new_count += side[corner.next[s]] > 0 ? 0 : 1;
+    }
+  }
+  for (std::int32_t m = 0; m < new_count; ++m) {
+    NewCorner& u = corners[m];
+    u.index = m < cut_count ? cut[m] : count_ + m - cut_count;
+    const double t = -side[u.kept] / (side[u.cut] - side[u.kept]);
+    const Vec3 kept = position(u.kept);
+    u.position = kept + t * (position(u.cut) - kept);
+  }
+  cut_count_ = cut_count;
+  new_count_ = new_count;
+}
+
+/// Whether the new corners form one loop around the new face; if not, rounding has made the part that is cut away something else than a cap.
+/// Leaves in starting_at_ where each plane's edge on the new face starts.
+bool ConvexCell::IsOneLoop() {
+  for (std::int32_t m = 0; m < new_count_; ++m) {
+    std::int32_t& start = starting_at_[new_corners_[m].b];
+    if (start >= 0) return false;  // a face cannot be crossed twice by one plane
+    start = m;
+  }
+  std::int32_t at = 0;
+  for (std::int32_t steps = 1; steps <= new_count_; ++steps) {
+    at = starting_at_[new_corners_[at].c];
+    if (at < 0) return false;
+    if (at == 0) return steps == new_count_;
+  }
+  return false;
 }
 
 /// Puts the new corners in place of those cut away and joins them into the new face's loop.
-bool ConvexCell::Link(std::int32_t plane) {
-  const auto added = static_cast<std::int32_t>(new_corners_.size());
-  const auto removed = static_cast<std::int32_t>(cut_.size());
-  const std::int32_t new_count = count_ + added - removed;
-  for (std::int32_t m = 0; m < added; ++m) {
-    NewCorner& u = new_corners_[m];
-    u.index = m < removed ? cut_[m] : count_ + m - removed;
-    if (starting_at_[u.b] >= 0) return false;  // a face cannot be crossed twice by one plane
-    starting_at_[u.b] = m;
-  }
-  // One loop through all new corners, or the part cut away was not one piece.
-  std::int32_t at = 0;
-  for (std::int32_t steps = 1;; ++steps) {
-    at = starting_at_[new_corners_[at].c];
-    if (at < 0 || steps > added) return false;
-    if (at == 0) {
-      if (steps != added) return false;
-      break;
-    }
-  }
-  for (const NewCorner& u : new_corners_) {
+void ConvexCell::Link(std::int32_t plane) {
+  const std::int32_t new_total = count_ + new_count_ - cut_count_;
+  for (std::int32_t m = 0; m < new_count_; ++m) {
+    // The kept end's link along this edge leaves from its third plane.
+    const NewCorner& u = new_corners_[m];
     Corner& kept = corners_[u.kept];
-    // Not yet overwritten links still name the corner cut away; in a degenerate cell two edges may join the same two corners.
-    for (int s = 0; s < 3; ++s) {
-      if (kept.next[s] == u.cut && kept.plane[(s + 1) % 3] == u.c && kept.plane[(s + 2) % 3] == u.b) kept.next[s] = -1 - u.index;
-    }
+    const auto on_edge = [&](std::int32_t p) { return p == u.b || p == u.c; };
+    kept.next[on_edge(kept.plane[0]) ? (on_edge(kept.plane[1]) ? 2 : 1) : 0] = u.index;
   }
-  for (const NewCorner& u : new_corners_) {
-    for (std::int32_t& next : corners_[u.kept].next) {
-      if (next < 0) next = -1 - next;
-    }
-  }
-  Reserve(std::max(count_, new_count));
-  for (const NewCorner& u : new_corners_) {
+  if (static_cast<std::size_t>(Padded(new_total)) > x_.size()) Reserve(new_total);
+  for (std::int32_t m = 0; m < new_count_; ++m) {
+    const NewCorner& u = new_corners_[m];
+    const NewCorner& following = new_corners_[starting_at_[u.c]];
     Corner& corner = corners_[u.index];
     corner.plane = {plane, u.b, u.c};
     corner.next[0] = u.kept;
+    corner.next[1] = following.index;
+    corners_[following.index].next[2] = u.index;
     x_[u.index] = u.position.x();
     y_[u.index] = u.position.y();
     z_[u.index] = u.position.z();
   }
-  for (const NewCorner& u : new_corners_) {
-    const std::int32_t following = new_corners_[starting_at_[u.c]].index;
-    corners_[u.index].next[1] = following;
-    corners_[following].next[2] = u.index;
-  }
-  if (new_count < count_) FillHoles(new_count);
-  count_ = new_count;
-  return true;
+  if (new_total < count_) FillHoles(new_total);
+  count_ = new_total;
 }
 
 /// Moves the last corners into the places that more cut than new corners have left empty.
-void ConvexCell::FillHoles(std::int32_t new_count) {
-  const auto added = new_corners_.size();
-  std::size_t hole = added;
-  const auto is_hole = [&](std::int32_t i) { return std::find(cut_.begin() + static_cast<std::ptrdiff_t>(added), cut_.end(), i) != cut_.end(); };
-  for (std::int32_t last = count_ - 1; last >= new_count; --last) {
-    if (!is_hole(last)) {
-      while (cut_[hole] >= new_count) ++hole;
+void ConvexCell::FillHoles(std::int32_t new_total) {
+  std::int32_t hole = new_count_;  // cut_[new_count_ … cut_count_−1] are empty
+  std::int32_t last_hole = cut_count_ - 1;
+  for (std::int32_t last = count_ - 1; last >= new_total; --last) {
+    if (last_hole >= hole && cut_[last_hole] == last) {
+      --last_hole;
+    } else {
       const std::int32_t to = cut_[hole++];
       x_[to] = x_[last], y_[to] = y_[last], z_[to] = z_[last];
       corners_[to] = corners_[last];

@@ -45,19 +45,22 @@ class ConvexCell {
   std::int32_t name(std::int32_t i) const { return names_[i]; }
 
  private:
+  /// On the plane of a cut, on an edge that it crosses.
   struct NewCorner {
-    geometry::Vec3 position;
-    std::int32_t b, c;  // the planes of the edge it lies on
-    std::int32_t kept;  // that edge's end inside
-    std::int32_t cut;   // and the one cut away
+    std::int32_t cut;   // the edge's end that is cut away
+    std::int32_t kept;  // and the one that stays
+    std::int32_t b, c;  // the planes of the edge
     std::int32_t index;
+    geometry::Vec3 position;
   };
 
   static const ConvexCell& UnitDodecahedron();
   void StartAsCube(double half_side);
   void DropUnusedPlanes();
   void Reserve(std::int32_t corners);
-  bool Link(std::int32_t plane);
+  void FindCrossedEdges();
+  bool IsOneLoop();
+  void Link(std::int32_t plane);
   void FillHoles(std::int32_t new_count);
   void UpdateRadius();
 
@@ -68,7 +71,9 @@ class ConvexCell {
   std::vector<std::int32_t> names_;
   double radius_squared_ = 0;
 
-  std::vector<std::int32_t> cut_;          // corners beyond the plane
+  std::int32_t cut_count_ = 0;
+  std::int32_t new_count_ = 0;
+  std::vector<std::int32_t> cut_;          // corners beyond the plane, ascending
   std::vector<NewCorner> new_corners_;     // on the plane
   std::vector<std::int32_t> starting_at_;  // [planes] the new corner whose edge has this plane as b, or −1
 };

@@ -142,10 +142,14 @@ class Assembler {
     }
   }
 
-  std::int32_t VoronoiVertex(std::int32_t site, const VoronoiDiagram::Corner& corner, std::span<const std::int32_t> names) {
+  /// An end of an edge that lies in the solid: with `times` 1 the edge's part in the solid begins there, with −1 it ends there.
+  void AddEnd(std::int32_t site, const VoronoiDiagram::Corner& corner, std::span<const std::int32_t> names, double at, std::int32_t times) {
+    if (times == 0) return;
     VertexKey key{VertexKey::kVoronoiVertex, {site, names[corner.plane[0]], names[corner.plane[1]], names[corner.plane[2]]}};
     std::ranges::sort(key.id);
-    return table_.Number(key, complex_.sites[site] + corner.position);
+    const std::int32_t vertex = table_.Number(key, complex_.sites[site] + corner.position);
+    std::vector<OnEdge>& list = times > 0 ? enters_ : leaves_;
+    list.insert(list.end(), static_cast<std::size_t>(std::abs(times)), {at, vertex});
   }
 
   /// The parts of the cell's edges in the solid.
@@ -153,8 +157,8 @@ class Assembler {
     const VoronoiDiagram::Cell& cell = clipped_.diagram().cell(site);
     const auto names = clipped_.diagram().names(cell);
     const auto corners = clipped_.diagram().corners(cell);
-    const std::int64_t inside_begin = complex_.inside_begin[site];
-    const auto inside = [&](std::size_t v) { return inside_begin < 0 || complex_.inside[inside_begin + v]; };
+    const std::int64_t begin = complex_.winding_begin[site];
+    const auto winding = [&](std::size_t v) { return begin < 0 ? 1 : complex_.winding[begin + static_cast<std::int64_t>(v)]; };
     for (std::size_t v = 0; v < corners.size(); ++v) {
       for (int s = 0; s < 3; ++s) {
         const std::size_t w = corners[v].next[s];
@@ -163,10 +167,10 @@ class Assembler {
         const std::int32_t left = corners[v].plane[(s + 2) % 3];
         enters_.clear();
         leaves_.clear();
-        if (inside(v)) enters_.push_back({0, VoronoiVertex(site, corners[v], names)});
+        AddEnd(site, corners[v], names, 0, winding(v));
         CollectCrossings(site, names[left], names[right], corners[v].position, corners[w].position);
-        if (inside(w)) leaves_.push_back({2, VoronoiVertex(site, corners[w], names)});
-        // Sorted along the edge, entering and leaving alternate; their numbers agree by the corners' status.
+        AddEnd(site, corners[w], names, 2, -winding(w));
+        // Sorted along the edge, entering and leaving alternate; their numbers agree by the corners' winding.
         std::ranges::sort(enters_, {}, &OnEdge::at);
         std::ranges::sort(leaves_, {}, &OnEdge::at);
         for (std::size_t k = 0; k < std::min(enters_.size(), leaves_.size()); ++k) {

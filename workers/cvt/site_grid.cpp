@@ -51,10 +51,7 @@ void SiteGrid::Build(const std::vector<Vec3>& sites, double side) {
   for (int a = 0; a < 3; ++a) size_[a] = static_cast<std::int32_t>(std::floor(size[a] / side_)) + 1;
 
   begin_.assign(static_cast<std::size_t>(size_[0]) * size_[1] * size_[2] + 1, 0);
-  const auto index = [&](const Vec3& site) {
-    const auto b = BoxOf(site);
-    return (static_cast<std::size_t>(b[2]) * size_[1] + b[1]) * size_[0] + b[0];
-  };
+  const auto index = [&](const Vec3& site) { return static_cast<std::size_t>(Index(BoxOf(site))); };
   for (const Vec3& site : sites) ++begin_[index(site) + 1];
   for (std::size_t b = 1; b < begin_.size(); ++b) begin_[b] += begin_[b - 1];
   entries_.resize(sites.size());
@@ -68,20 +65,9 @@ std::array<std::int32_t, 3> SiteGrid::BoxOf(const Vec3& point) const {
   return box;
 }
 
-double SiteGrid::SquaredDistanceToBox(const Vec3& point, const std::array<std::int32_t, 3>& box) const {
-  double squared = 0;
-  for (int a = 0; a < 3; ++a) {
-    const double at = point[a] - low_[a];
-    const double gap = std::max({box[a] * side_ - at, at - (box[a] + 1) * side_, 0.0});
-    squared += gap * gap;
-  }
-  // A site on the border of two boxes may have been filed in either: never cut it off by rounding.
-  return squared * (1 - 1e-9);
-}
-
 std::int32_t SiteGrid::Nearest(const Vec3& point) const {
   std::int32_t best = -1;
-  double best_squared = std::numeric_limits<double>::infinity();
+  double best_squared = std::numeric_limits<double>::max();  // less than the distance to boxes that do not exist
   Around(
       point, [&] { return best_squared; },
       [&](const Entry& entry) {

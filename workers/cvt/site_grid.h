@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <cstdlib>
+#include <limits>
 #include <vector>
 
 #include "services/geometry/vector.h"
@@ -48,11 +50,20 @@ class SiteGrid {
   static const std::vector<Offset>& SortedOffsets();
 
   std::array<std::int32_t, 3> BoxOf(const geometry::Vec3& point) const;
-  double SquaredDistanceToBox(const geometry::Vec3& point, const std::array<std::int32_t, 3>& box) const;
+  /// From the point to the slab of boxes numbered `box` along an axis; infinite when there is no such slab.
+  double SquaredGap(const geometry::Vec3& point, int axis, std::int32_t box) const {
+    if (box < 0 || box >= size_[axis]) return std::numeric_limits<double>::infinity();
+    const double at = point[axis] - low_[axis];
+    const double gap = std::max({box * side_ - at, at - (box + 1) * side_, 0.0});
+    // A site on the border of two boxes may have been filed in either: never cut it off by rounding.
+    return gap * gap * (1 - 1e-9);
+  }
+  std::int64_t Index(const std::array<std::int32_t, 3>& box) const {
+    return (static_cast<std::int64_t>(box[2]) * size_[1] + box[1]) * size_[0] + box[0];
+  }
   template <typename Visit>
-  void VisitBox(const std::array<std::int32_t, 3>& box, Visit&& visit) const {
-    const std::size_t b = (static_cast<std::size_t>(box[2]) * size_[1] + box[1]) * size_[0] + box[0];
-    for (std::int32_t e = begin_[b]; e < begin_[b + 1]; ++e) visit(entries_[e]);
+  void VisitBox(std::int64_t box, Visit&& visit) const {
+    for (std::int32_t e = begin_[box]; e < begin_[box + 1]; ++e) visit(entries_[e]);
   }
 
   geometry::Vec3 low_ = geometry::Vec3::Zero();
@@ -66,23 +77,31 @@ template <typename Radius, typename Visit>
 void SiteGrid::Around(const geometry::Vec3& centre, Radius&& radius_squared, Visit&& visit) const {
   const std::array<std::int32_t, 3> home = BoxOf(centre);
   const double side_squared = side_ * side_;
-  const auto look = [&](std::int32_t x, std::int32_t y, std::int32_t z) {
-    if (x < 0 || y < 0 || z < 0 || x >= size_[0] || y >= size_[1] || z >= size_[2]) return;
-    const std::array<std::int32_t, 3> box{x, y, z};
-    if (SquaredDistanceToBox(centre, box) <= radius_squared()) VisitBox(box, visit);
-  };
+  // Squared gaps to the slabs of boxes around, by axis; boxes that do not exist are infinitely far away.
+  std::array<std::array<double, 2 * kRings + 1>, 3> gap;
+  const auto rings = static_cast<std::int32_t>(std::min<double>(kRings, std::sqrt(radius_squared()) / side_ + 1));
+  for (int a = 0; a < 3; ++a) {
+    for (std::int32_t d = -rings; d <= rings; ++d) gap[a][d + kRings] = SquaredGap(centre, a, home[a] + d);
+  }
+  const std::int64_t first = Index(home);
+  const std::int64_t row = size_[0];
+  const std::int64_t sheet = row * size_[1];
   for (const Offset& offset : SortedOffsets()) {
     if (offset.distance_squared * side_squared > radius_squared()) return;
-    look(home[0] + offset.step[0], home[1] + offset.step[1], home[2] + offset.step[2]);
+    const auto& [x, y, z] = offset.step;
+    if (gap[0][x + kRings] + gap[1][y + kRings] + gap[2][z + kRings] > radius_squared()) continue;
+    VisitBox(first + z * sheet + y * row + x, visit);
   }
   // Few sites, or a far-reaching cell: go on ring by ring.
   for (std::int32_t ring = kRings + 1;; ++ring) {
-    const double gap = (ring - 1) * side_;
-    if (gap * gap > radius_squared() || ring > std::max({size_[0], size_[1], size_[2]})) return;
+    const double nearest = (ring - 1) * side_;
+    if (nearest * nearest > radius_squared() || ring > std::max({size_[0], size_[1], size_[2]})) return;
     for (std::int32_t z = std::max(home[2] - ring, 0); z <= std::min(home[2] + ring, size_[2] - 1); ++z) {
       for (std::int32_t y = std::max(home[1] - ring, 0); y <= std::min(home[1] + ring, size_[1] - 1); ++y) {
         const bool shell = std::abs(z - home[2]) == ring || std::abs(y - home[1]) == ring;
-        for (std::int32_t x = home[0] - ring; x <= home[0] + ring; x += shell ? 1 : 2 * ring) look(x, y, z);
+        for (std::int32_t x = home[0] - ring; x <= home[0] + ring; x += shell ? 1 : 2 * ring) {
+          if (SquaredGap(centre, 0, x) + SquaredGap(centre, 1, y) + SquaredGap(centre, 2, z) <= radius_squared()) VisitBox(Index({x, y, z}), visit);
+        }
       }
     }
   }

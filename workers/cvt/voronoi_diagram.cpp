@@ -12,7 +12,9 @@ namespace {
 using geometry::Vec3;
 
 /// Reach of a cell before anything is known about it, in spacings: a relaxed cell's corners lie within 0.8 spacings.
-constexpr double kFirstReach = 1.15;
+constexpr double kFirstReach = 1.0;
+/// Side of the grid's boxes, in spacings: fewer boxes to look at against more sites in each.
+constexpr double kGridSide = 1.4;
 
 }  // namespace
 
@@ -28,7 +30,7 @@ bool VoronoiDiagram::Build(const std::vector<Vec3>& sites, double spacing, Neigh
   names_.reserve(16 * sites.size());
   corners_.reserve(28 * sites.size());
   sites_ = sites;
-  grid_.Build(sites_, spacing);
+  grid_.Build(sites_, kGridSide * spacing);
   seen_.assign(sites_.size(), -1);
   neighbours_ = neighbours;
   if (neighbours_ == Neighbours::kTetGen) {
@@ -75,10 +77,8 @@ bool VoronoiDiagram::BuildCell(std::int32_t site, double reach, std::span<const 
     grid_.Around(
         centre, [&] { return sound ? 4 * work_.RadiusSquared() : -1.0; },
         [&](const SiteGrid::Entry& entry) {
-          if (!sound || seen_[entry.site] == site) return;
-          if (SquaredDistance(entry.position, centre) < 4 * work_.RadiusSquared()) {
-            sound = work_.Cut((entry.position - centre) / 2, entry.site);
-          }
+          if (SquaredDistance(entry.position, centre) >= 4 * work_.RadiusSquared() || seen_[entry.site] == site || !sound) return;
+          sound = work_.Cut((entry.position - centre) / 2, entry.site);
         });
     for (std::int32_t other : candidates) {
       if (other >= 0) seen_[other] = -1;

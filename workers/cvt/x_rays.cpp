@@ -58,8 +58,8 @@ std::int32_t XRays::Column(double y) const { return static_cast<std::int32_t>(st
 
 std::int32_t XRays::Row(double z) const { return static_cast<std::int32_t>(std::clamp((z - z_low_) * z_scale_, 0.0, rows_ - 1.0)); }
 
-void XRays::Crossings(double y, double z, std::vector<double>* crossings) const {
-  crossings->clear();
+template <typename Visit>
+void XRays::VisitCrossings(double y, double z, Visit&& visit) const {
   const std::size_t b = static_cast<std::size_t>(Row(z)) * columns_ + Column(y);
   for (std::int64_t i = bucket_begin_[b]; i < bucket_begin_[b + 1]; ++i) {
     const auto& t = triangles_[bucket_[i]];
@@ -69,16 +69,28 @@ void XRays::Crossings(double y, double z, std::vector<double>* crossings) const 
     const Vec3 normal = (vertices_[t[1]] - a).cross(vertices_[t[2]] - a);
     const auto [x0, x1] = std::minmax({a.x(), vertices_[t[1]].x(), vertices_[t[2]].x()});
     const double x = normal.x() != 0 ? a.x() - (normal.y() * (y - a.y()) + normal.z() * (z - a.z())) / normal.x() : a.x();
-    crossings->push_back(std::clamp(x, x0, x1));
+    visit(std::clamp(x, x0, x1), left);
   }
+}
+
+void XRays::Crossings(double y, double z, std::vector<double>* crossings) const {
+  crossings->clear();
+  VisitCrossings(y, z, [&](double x, bool) { crossings->push_back(x); });
   std::ranges::sort(*crossings);
 }
 
 bool XRays::Inside(const Vec3& point) const {
-  std::vector<double> crossings;
-  Crossings(point.y(), point.z(), &crossings);
-  const auto beyond = crossings.end() - std::ranges::upper_bound(crossings, point.x());
-  return beyond % 2 == 1;
+  bool inside = false;
+  VisitCrossings(point.y(), point.z(), [&](double x, bool) { inside ^= x > point.x(); });
+  return inside;
+}
+
+std::int32_t XRays::Winding(const Vec3& point) const {
+  std::int32_t winding = 0;
+  VisitCrossings(point.y(), point.z(), [&](double x, bool leaves) {
+    if (x > point.x()) winding += leaves ? 1 : -1;
+  });
+  return winding;
 }
 
 }  // namespace vorocast::cvt

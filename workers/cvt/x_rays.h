@@ -20,8 +20,13 @@ class XRays {
   void Crossings(double y, double z, std::vector<double>* crossings) const;
   /// True when an odd number of crossings lies beyond the point.
   bool Inside(const geometry::Vec3& point) const;
+  /// How many times the surface winds around the point: 1 inside and 0 outside, other numbers where it overlaps itself.
+  std::int32_t Winding(const geometry::Vec3& point) const;
 
  private:
+  /// Calls visit(x, leaves) for every crossing of the line (y, z); `leaves` when the line, followed towards +x, leaves the solid there.
+  template <typename Visit>
+  void VisitCrossings(double y, double z, Visit&& visit) const;
   std::int32_t Column(double y) const;
   std::int32_t Row(double z) const;
 
