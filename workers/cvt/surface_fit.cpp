@@ -2,10 +2,13 @@
 #include "workers/cvt/surface_fit.h"
 
 #include <algorithm>
+#include <array>
+#include <vector>
 
 namespace vorocast::cvt {
 namespace {
 
+using geometry::Vec3;
 using geometry::Vec3f;
 
 /// Weighted sums over the points near a position, relative to it.
@@ -52,10 +55,33 @@ float Support(const Neighbourhood& sums, const Vec3f& normal, float radius) {
   return coverage * std::clamp(1.5F - 2.5F * aside, 0.0F, 1.0F);
 }
 
+Vec3 AreaVector(const std::vector<Vec3>& vertices, const std::array<std::int32_t, 3>& t) {
+  const Vec3& a = vertices[static_cast<std::size_t>(t[0])];
+  return (vertices[static_cast<std::size_t>(t[1])] - a).cross(vertices[static_cast<std::size_t>(t[2])] - a);
+}
+
+/// Puts the corners of triangles that the fit turned over, or nearly, back to where they were: there the points contradict one another,
+/// and the surface would cross itself.
+void UndoFolds(const std::vector<Vec3>& before, geometry::TriangleMesh& mesh) {
+  constexpr double kLeastCosine = 0.3;
+  constexpr int kMostPasses = 4;
+  for (int pass = 0; pass < kMostPasses; ++pass) {
+    std::vector<std::int32_t> folded;
+    for (const auto& t : mesh.triangles) {
+      const Vec3 old_area = AreaVector(before, t);
+      const Vec3 new_area = AreaVector(mesh.vertices, t);
+      if (old_area.dot(new_area) < kLeastCosine * old_area.norm() * new_area.norm()) folded.insert(folded.end(), t.begin(), t.end());
+    }
+    if (folded.empty()) return;
+    for (std::int32_t v : folded) mesh.vertices[static_cast<std::size_t>(v)] = before[static_cast<std::size_t>(v)];
+  }
+}
+
 }  // namespace
 
 void FitSurface(const SortedPoints& points, const GridFrame& frame, const SurfaceFitOptions& options, geometry::TriangleMesh& mesh) {
-  const std::vector<geometry::Vec3> facing = geometry::VertexNormals(mesh);
+  const std::vector<Vec3> facing = geometry::VertexNormals(mesh);
+  const std::vector<Vec3> before = mesh.vertices;
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
     const Vec3f start = frame.ToGrid(mesh.vertices[v]);
     Vec3f direction = facing[v].cast<float>();
@@ -74,6 +100,7 @@ void FitSurface(const SortedPoints& points, const GridFrame& frame, const Surfac
     x = length > options.step_max ? Vec3f(start + step * (options.step_max / length)) : x;
     mesh.vertices[v] = frame.ToWorld(x);
   }
+  UndoFolds(before, mesh);
 }
 
 }  // namespace vorocast::cvt

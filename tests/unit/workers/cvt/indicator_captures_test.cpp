@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/unit/workers/cvt/indicator_scenes.h"
+#include "workers/cvt/self_intersection.h"
 #include "workers/cvt/surface_from_mesh.h"
 #include "workers/cvt/surface_from_points.h"
 
@@ -53,6 +54,7 @@ TEST(IndicatorOnCaptures, KeepsAFigureInOnePieceInEveryPose) {
     const auto surface = SurfaceFromPoints(scenes::Scan(*truth, 65'386, 0.001, 5), {}, &summary);
     ASSERT_TRUE(surface.ok()) << surface.status();
     EXPECT_TRUE(geometry::IsClosed(surface->mesh)) << frame;
+    EXPECT_FALSE(CrossesItself(surface->mesh)) << frame;
     EXPECT_NEAR(geometry::SignedVolume(surface->mesh), geometry::SignedVolume(*truth), 0.01 * geometry::SignedVolume(*truth)) << frame;
     EXPECT_LT(scenes::Measure(geometry::SampleSurface(surface->mesh, 10'000, 6).positions, scenes::DistanceTo(*truth)).mean, 0.0005) << frame;
     // The captured meshes overlap themselves between the legs; points inside there are on no surface.
