@@ -13,10 +13,14 @@ namespace {
 using geometry::Vec3f;
 
 constexpr double kTrimmed = 0.001;
-constexpr float kMargin = 0.07F;      // of the window's larger side, on every side
-constexpr float kEyeDistance = 3.2F;  // in units of the extent: a long lens, as for portraits
-constexpr double kHeightMin = 0.5;    // in units of the width
+constexpr float kMargin = 0.07F;         // of the window's larger side, on every side
+constexpr float kEyeDistance = 3.2F;     // in units of the extent: a long lens, as for portraits
+constexpr float kCompanionReach = 0.5F;  // in units of the extent, beyond the subject's box
+constexpr double kHeightMin = 0.5;       // in units of the width
 constexpr double kHeightMax = 1.6;
+constexpr float kToesAgree = 0.8F;
+constexpr double kThreeQuarters_deg = 25;
+constexpr double kAzimuthStep_deg = 15;  // so that the stages of one take are seen from the same side, though they differ a little
 
 /// The values' range without the trimmed part of each end.
 std::pair<float, float> TrimmedRange(std::vector<float> values) {
@@ -27,7 +31,59 @@ std::pair<float, float> TrimmedRange(std::vector<float> values) {
   return {low, *(values.end() - 1 - trimmed)};
 }
 
+/// Mean of the centres between two heights; false where there are none.
+bool MeanBetween(const Bounds& bounds, float low, float high, Vec3f& mean) {
+  Vec3f sum = Vec3f::Zero();
+  std::size_t count = 0;
+  for (const Vec3f& c : bounds.centres) {
+    if (c.y() < low || c.y() > high) continue;
+    sum += c;
+    ++count;
+  }
+  if (count == 0) return false;
+  mean = sum / static_cast<float>(count);
+  return true;
+}
+
 }  // namespace
+
+double ChooseAzimuth(const std::vector<Bounds>& pictures) {
+  // Horizontal second moments about each picture's own middle, so that walking about does not count, and the direction of the feet.
+  double xx = 0, xz = 0, zz = 0;
+  Vec3f toes = Vec3f::Zero();
+  float toes_length = 0;
+  for (const Bounds& bounds : pictures) {
+    if (bounds.centres.empty()) continue;
+    Vec3f middle = Vec3f::Zero();
+    float low = bounds.centres[0].y();
+    float high = low;
+    for (const Vec3f& c : bounds.centres) {
+      middle += c / static_cast<float>(bounds.centres.size());
+      low = std::min(low, c.y());
+      high = std::max(high, c.y());
+    }
+    for (const Vec3f& c : bounds.centres) {
+      const Eigen::Vector3d arm = (c - middle).cast<double>() / std::sqrt(static_cast<double>(bounds.centres.size()));
+      xx += arm.x() * arm.x();
+      xz += arm.x() * arm.z();
+      zz += arm.z() * arm.z();
+    }
+    const float height = high - low;
+    Vec3f feet;
+    Vec3f shins;
+    if (!MeanBetween(bounds, low, low + 0.04F * height, feet) || !MeanBetween(bounds, low + 0.12F * height, low + 0.25F * height, shins)) continue;
+    const Vec3f step = Vec3f(1, 0, 1).cwiseProduct(feet - shins);
+    toes += step;
+    toes_length += step.norm();
+  }
+  const double widest = 0.5 * std::atan2(2 * xz, xx - zz);  // angle from x towards z
+  Vec3f front(static_cast<float>(-std::sin(widest)), 0, static_cast<float>(std::cos(widest)));
+  if (front.dot(toes) < 0 || (front.dot(toes) == 0 && front.z() < 0)) front = -front;
+  // Feet that agree with each other know better than the widest direction, which is none for a body with its arms down.
+  if (toes.norm() > kToesAgree * toes_length && toes.norm() > 0) front = toes;
+  const double azimuth = std::atan2(static_cast<double>(front.x()), static_cast<double>(front.z())) * 180 / std::numbers::pi + kThreeQuarters_deg;
+  return kAzimuthStep_deg * std::round(azimuth / kAzimuthStep_deg);
+}
 
 absl::Status Settle(Bounds& bounds) {
   if (bounds.centres.empty()) return absl::InvalidArgumentError("there is nothing to draw: every picture is empty");
@@ -52,6 +108,10 @@ absl::Status Settle(Bounds& bounds) {
     kept.ground = std::min(kept.ground, c.y() - bounds.radii[i]);
   }
   kept.extent = std::max((high - low).maxCoeff(), 2 * *std::ranges::max_element(kept.radii));
+  const float reach = kCompanionReach * kept.extent;
+  for (const Vec3f& c : bounds.companions) {
+    if (((c - low).array() >= -reach).all() && ((c - high).array() <= reach).all()) kept.companions.push_back(c);
+  }
   bounds = std::move(kept);
   return absl::OkStatus();
 }
@@ -74,15 +134,17 @@ Camera FrameBounds(const Bounds& bounds, const Framing& framing) {
 
   // The window: extents of all spheres on the plane at distance 1. A sphere's own size there is radius / depth, near enough this far off.
   float left = 1e9F, right = -1e9F, bottom = 1e9F, top = -1e9F;
-  for (std::size_t i = 0; i < bounds.centres.size(); ++i) {
-    const Vec3f arm = bounds.centres[i] - camera.eye;
+  const auto show = [&](const Vec3f& centre, float radius) {
+    const Vec3f arm = centre - camera.eye;
     const float depth = std::max(arm.dot(camera.forward), 1e-3F);
     const float x = arm.dot(camera.right) / depth;
     const float y = arm.dot(camera.up) / depth;
-    const float r = bounds.radii[i] / depth;
+    const float r = radius / depth;
     left = std::min(left, x - r), right = std::max(right, x + r);
     bottom = std::min(bottom, y - r), top = std::max(top, y + r);
-  }
+  };
+  for (std::size_t i = 0; i < bounds.centres.size(); ++i) show(bounds.centres[i], bounds.radii[i]);
+  for (const Vec3f& corner : bounds.companions) show(corner, 0);
   const float margin = kMargin * std::max(right - left, top - bottom);
   left -= margin, right += margin, bottom -= margin, top += margin;
   // Too flat or too tall a window grows on both sides.

@@ -19,8 +19,8 @@ using geometry::Vec3f;
 
 const Vec3f kMetal(0.46F, 0.47F, 0.49F);
 /// The skin stands out from the cut faces within.
-constexpr float kSkinWhite = 0.18F;
-constexpr float kCutDark = 0.80F;
+constexpr float kSkinWhite = 0.10F;
+constexpr float kCutDark = 0.72F;
 
 bool IsDrawn(const CellsPicture& picture, std::size_t cell) { return picture.state.empty() || picture.state[cell] != CellState::kGone; }
 
@@ -111,6 +111,9 @@ void AddBounds(const CellsPicture& picture, Bounds& bounds) {
     }
     bounds.centres.push_back((PoseOf(picture, cell) * cells.centroid[cell]).cast<float>());
     bounds.radii.push_back(static_cast<float>(std::sqrt(squared)));
+  }
+  for (const auto& [object, world_from_object] : picture.objects) {
+    for (const Vec3& v : object->vertices) bounds.companions.push_back((world_from_object * v).cast<float>());
   }
 }
 

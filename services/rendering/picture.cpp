@@ -14,36 +14,35 @@ namespace {
 
 using geometry::Vec3f;
 
-// Rays a pixel: kSamples through the lens, and for each one to the key light and kSkyRays to the sky.
+// Rays a pixel: kSamples through the lens, and for each some to the key light and kSkyRays to the sky. A large shadow on the bare ground
+// shows grain that a coloured surface hides, and rays from there mostly meet nothing, which costs little.
 constexpr int kSamples = 4;
 constexpr int kSkyRays = 4;
+constexpr int kKeyRaysGround = 4;
+constexpr int kKeyRaysSurface = 1;
 /// Rotated grid: its four rows and columns are all different, which smooths near-vertical and near-horizontal edges best.
 constexpr std::array<std::array<float, 2>, kSamples> kLens = {{{0.125F, 0.625F}, {0.375F, 0.125F}, {0.625F, 0.875F}, {0.875F, 0.375F}}};
 
 constexpr float kKeyAzimuth = -0.85F;   // radians from the camera, to its left
 constexpr float kKeyElevation = 0.85F;  // radians
 constexpr float kKeyRadius = 0.10F;     // radians: softness of shadows
-const Vec3f kKeyColour(1.30F, 1.22F, 1.10F);
+const Vec3f kKeyColour(1.22F, 1.15F, 1.05F);
 const Vec3f kSkyColour(0.66F, 0.70F, 0.76F);
 constexpr float kGroundGlow = 0.62F;  // light from below, as a part of the sky's
 constexpr float kSkyReach = 0.40F;    // ambient shadows reach this far, in units of the extent
 constexpr float kFar = 1e4F;
 
-/// Two independent numbers in [0, 1) for a pixel, from an integer hash (Wellons' lowbias32).
-std::uint32_t Hash(std::uint32_t x) {
-  x ^= x >> 16;
-  x *= 0x7feb352dU;
-  x ^= x >> 15;
-  x *= 0x846ca68bU;
-  return x ^ (x >> 16);
-}
-float Unit(std::uint32_t bits) { return static_cast<float>(bits >> 8) * 0x1.0p-24F; }
 float Wrap(float x) { return x - std::floor(x); }
 
-/// Stratified pairs in the unit square: sample i of n × n, shifted by the pixel's own amount.
+/// Two numbers in [0, 1) for a pixel. Interleaved gradient noise (Jimenez 2014): neighbours differ so evenly that what is left of it looks
+/// like fine grain and not like dirt.
 struct Jitter {
   float u, v;
-  explicit Jitter(std::uint32_t pixel) : u(Unit(Hash(2 * pixel))), v(Unit(Hash(2 * pixel + 1))) {}
+  Jitter(std::int32_t column, std::int32_t row) : u(Noise(column, row)), v(Noise(column + 37, row + 17)) {}
+
+  static float Noise(std::int32_t column, std::int32_t row) {
+    return Wrap(52.9829189F * Wrap(0.06711056F * static_cast<float>(column) + 0.00583715F * static_cast<float>(row)));
+  }
 };
 
 /// Two axes that span the plane of a unit vector (Duff et al. 2017).
@@ -81,7 +80,7 @@ class Painter {
 
   /// Linear colour.
   Vec3f Pixel(std::int32_t column, std::int32_t row, const Vec3f& backdrop) const {
-    const Jitter jitter(static_cast<std::uint32_t>(row) * static_cast<std::uint32_t>(camera_.width) + static_cast<std::uint32_t>(column));
+    const Jitter jitter(column, row);
     Vec3f sum = Vec3f::Zero();
     for (int sample = 0; sample < kSamples; ++sample) {
       const auto& lens = kLens[static_cast<std::size_t>(sample)];
@@ -106,7 +105,7 @@ class Painter {
     const Vec3f normal = behind ? Vec3f(-hit.normal) : hit.normal;
     const Vec3f colour = behind ? Vec3f(0.35F * hit.colour + Vec3f(0.03F, 0.04F, 0.06F)) : hit.colour;
     const Vec3f from = ray.origin + hit.distance * ray.direction + hit.clearance * normal;
-    const Vec3f key = KeyColour(from, normal, sample, jitter);
+    const Vec3f key = Key(from, normal, kKeyRaysSurface, sample, jitter) * kKeyColour;
     const Vec3f light = key * std::max(normal.dot(key_), 0.0F) + Sky(from, normal, sample, jitter);
     if (!hit.metal) return Expose(colour.cwiseProduct(light));
     const Vec3f mirrored = ray.direction - 2 * normal.dot(ray.direction) * normal;
@@ -119,19 +118,26 @@ class Painter {
   Vec3f Ground(const Vec3f& point, int sample, const Jitter& jitter, const Vec3f& backdrop) const {
     const Vec3f up = Vec3f::UnitY();
     const Vec3f from = point + 1e-4F * up;
-    const Vec3f open = kKeyColour * key_.y() + OpenSky();
-    const Vec3f light = KeyColour(from, up, sample, jitter) * key_.y() + Sky(from, up, sample, jitter);
+    const Vec3f open = key_.y() * kKeyColour + OpenSky();
+    const Vec3f light = Key(from, up, kKeyRaysGround, sample, jitter) * key_.y() * kKeyColour + Sky(from, up, sample, jitter);
     if (light == open) return backdrop;
     return backdrop.cwiseProduct(light.cwiseQuotient(open).cwiseMin(1.0F));
   }
 
-  /// The key light's colour, or black where something stands before this sample of its disc.
-  Vec3f KeyColour(const Vec3f& from, const Vec3f& normal, int sample, const Jitter& jitter) const {
-    if (normal.dot(key_) <= 0) return Vec3f::Zero();
-    const auto disc = Disc2(Wrap((static_cast<float>(sample) + jitter.v) / kSamples), Wrap(jitter.u + 0.618034F * static_cast<float>(sample)));
+  /// How much of the key light's disc is seen, 0 … 1.
+  float Key(const Vec3f& from, const Vec3f& normal, int rays, int sample, const Jitter& jitter) const {
+    if (normal.dot(key_) <= 0) return 0;
     const Frame frame(key_);
-    const Vec3f direction = (key_ + kKeyRadius * (disc[0] * frame.x + disc[1] * frame.y)).normalized();
-    return scene_.Occludes({.origin = from, .direction = direction, .reach = kFar}) ? Vec3f(Vec3f::Zero()) : kKeyColour;
+    const int total = rays * kSamples;
+    int seen = 0;
+    for (int i = 0; i < rays; ++i) {
+      // Over the pixel, rings of equal area and angles a golden ratio apart.
+      const auto k = static_cast<float>(sample + i * kSamples);
+      const auto disc = Disc2(Wrap((k + jitter.v) / static_cast<float>(total)), Wrap(jitter.u + 0.618034F * k));
+      const Vec3f direction = (key_ + kKeyRadius * (disc[0] * frame.x + disc[1] * frame.y)).normalized();
+      seen += scene_.Occludes({.origin = from, .direction = direction, .reach = kFar}) ? 0 : 1;
+    }
+    return static_cast<float>(seen) / static_cast<float>(rays);
   }
 
   /// Light of the sky over the hemisphere of a normal, cosine-weighted.

@@ -17,10 +17,13 @@ using geometry::Vec3;
 using geometry::Vec3f;
 
 constexpr std::size_t kNeighbours = 6;
-/// Discs this much wider than half the way to the sixth neighbour close the surface.
-constexpr float kOverlap = 0.75F;
+/// In units of the distance to the sixth neighbour: enough to close the surface.
+constexpr float kOverlap = 0.62F;
 /// No disc is wider than this many times the usual one: a stray point must not become a plate.
-constexpr float kWidest = 2.5F;
+constexpr float kWidest = 1.5F;
+/// Captured colours hold the light of the stage already: without a lift they would be lit, and darkened, twice.
+constexpr float kLift = 1.15F;
+constexpr float kBlack = 0.012F;
 const Vec3f kClay(0.72F, 0.62F, 0.53F);
 
 /// nanoflann's view of the positions.
@@ -65,7 +68,7 @@ std::vector<Disc> MakeDiscs(const geometry::OrientedPoints& points) {
     discs.push_back({.centre = points.positions[i].cast<float>(),
                      .normal = points.normals[i].cast<float>(),
                      .radius = radii[i],
-                     .colour = points.colours.empty() ? kClay : LinearFromRgb8(points.colours[i])});
+                     .colour = points.colours.empty() ? kClay : Vec3f(kLift * LinearFromRgb8(points.colours[i]) + Vec3f::Constant(kBlack))});
   }
   return discs;
 }

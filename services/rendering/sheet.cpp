@@ -48,7 +48,7 @@ Grid LayOut(std::size_t count, const Camera& camera, const SheetLayout& layout) 
     candidate.rows = (static_cast<std::int32_t>(count) + columns - 1) / columns;
     const double holes = static_cast<double>(candidate.columns * candidate.rows) / static_cast<double>(count);
     const double ratio = static_cast<double>(candidate.width()) / candidate.height();
-    const double cost = std::abs(std::log(ratio / kSheetRatio)) + 0.7 * (holes - 1);
+    const double cost = std::abs(std::log(ratio / kSheetRatio)) + 1.5 * (holes - 1);
     if (cost >= best) continue;
     best = cost;
     grid.columns = candidate.columns;
@@ -72,9 +72,9 @@ absl::Status CheckLayout(const SheetLayout& layout, std::size_t pictures) {
   }
   if (!(layout.shrink > 0 && layout.shrink <= 1))
     return absl::InvalidArgumentError(fmt::format("a shrink of {}: choose above 0, at most 1", layout.shrink));
-  if (!std::isfinite(layout.azimuth_deg) || !(layout.elevation_deg >= -10 && layout.elevation_deg <= 80)) {
+  if (!std::isfinite(layout.azimuth_deg.value_or(0)) || !(layout.elevation_deg >= -10 && layout.elevation_deg <= 80)) {
     return absl::InvalidArgumentError(
-        fmt::format("a camera at azimuth {}, elevation {}: the elevation goes from -10 to 80", layout.azimuth_deg, layout.elevation_deg));
+        fmt::format("a camera at azimuth {}, elevation {}: the elevation goes from -10 to 80", layout.azimuth_deg.value_or(0), layout.elevation_deg));
   }
   return absl::OkStatus();
 }
@@ -84,16 +84,25 @@ absl::StatusOr<Scene> BuildScene(const CellsPicture& picture, const SheetLayout&
   return Scene::Build({}, MakeMeshes(picture, layout.shrink));
 }
 
-/// One camera for all: from the bounds of all pictures together.
 template <typename Picture>
-absl::StatusOr<Bounds> BoundsOfAll(const std::vector<Picture>& pictures) {
-  Bounds bounds;
+absl::StatusOr<std::vector<Bounds>> BoundsOfEach(const std::vector<Picture>& pictures) {
+  std::vector<Bounds> bounds(pictures.size());
   for (std::size_t i = 0; i < pictures.size(); ++i) {
     if (absl::Status status = CheckPicture(pictures[i]); !status.ok()) return base::Annotate(status, fmt::format("picture {}", i));
-    AddBounds(pictures[i], bounds);
+    AddBounds(pictures[i], bounds[i]);
   }
-  RETURN_IF_ERROR(Settle(bounds));
   return bounds;
+}
+
+absl::StatusOr<Bounds> BoundsOfAll(const std::vector<Bounds>& pictures) {
+  Bounds all;
+  for (const Bounds& one : pictures) {
+    all.centres.insert(all.centres.end(), one.centres.begin(), one.centres.end());
+    all.radii.insert(all.radii.end(), one.radii.begin(), one.radii.end());
+    all.companions.insert(all.companions.end(), one.companions.begin(), one.companions.end());
+  }
+  RETURN_IF_ERROR(Settle(all));
+  return all;
 }
 
 /// A sheet of paper with its title and labels, before the pictures are pasted in.
@@ -123,9 +132,10 @@ Image Print(const std::vector<Picture>& pictures, const Grid& grid, const std::s
 template <typename Picture>
 absl::StatusOr<Image> Render(const std::vector<Picture>& pictures, const SheetLayout& layout, const base::Progress& progress) {
   RETURN_IF_ERROR(CheckLayout(layout, pictures.size()));
-  ASSIGN_OR_RETURN(const Bounds bounds, BoundsOfAll(pictures));
-  const Camera camera =
-      FrameBounds(bounds, {.azimuth_deg = layout.azimuth_deg, .elevation_deg = layout.elevation_deg, .width = layout.picture_width});
+  ASSIGN_OR_RETURN(const std::vector<Bounds> each, BoundsOfEach(pictures));
+  ASSIGN_OR_RETURN(const Bounds bounds, BoundsOfAll(each));
+  const double azimuth_deg = layout.azimuth_deg ? *layout.azimuth_deg : ChooseAzimuth(each);
+  const Camera camera = FrameBounds(bounds, {.azimuth_deg = azimuth_deg, .elevation_deg = layout.elevation_deg, .width = layout.picture_width});
   const Grid grid = LayOut(pictures.size(), camera, layout);
   if (static_cast<double>(grid.width()) * grid.height() > kPixelsMax) {
     return absl::InvalidArgumentError(

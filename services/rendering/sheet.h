@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -41,9 +42,9 @@ struct CellsPicture {
 struct SheetLayout {
   std::int32_t picture_width = 480;  // pixels; height follows from the bounds of all pictures
   std::string title;
-  double shrink = 0.92;       // cells are drawn this much of their size, 0 … 1
-  double azimuth_deg = 25;    // of the camera around the vertical: 0 looks along −z, 90 along −x
-  double elevation_deg = 10;  // of the camera above the horizon, −10 … 80
+  double shrink = 0.92;               // cells are drawn this much of their size, 0 … 1
+  std::optional<double> azimuth_deg;  // of the camera around the vertical: 0 looks along −z, 90 along −x; unset: three-quarters from the front
+  double elevation_deg = 10;          // of the camera above the horizon, −10 … 80
 };
 
 /// One sheet: pictures in reading order, one camera for all (from the bounds of all, without the outermost thousandth of the points and
