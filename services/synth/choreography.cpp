@@ -163,7 +163,7 @@ Pose PoseAt(double seconds) {
   PoseTrunk(seconds, pose);
   const double sweep = Wave(seconds, 4.2, -0.25);
   PoseArm(true,
-          {.elevation = (2 + 50 * sweep) * kDegree,
+          {.elevation = (8 + 45 * sweep) * kDegree,
            .forward = (22 + 24 * Wave(seconds, 4.2, -0.05)) * kDegree,
            .elbow = (34 - 16 * sweep) * kDegree,
            .roll = (20 + 25 * sweep) * kDegree,

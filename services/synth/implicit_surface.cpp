@@ -56,16 +56,18 @@ Grid SampleGrid(const ImplicitSurface& surface, double cell, double shift) {
   const auto [nx, ny, nz] = grid.size;
   grid.values.resize(grid.Index(0, 0, nz));
   // The field is no exact distance: blends lower it and stretches shrink it, so the test for "far away" keeps a reserve.
-  const double reach = 0.5 * std::sqrt(3.0) * kBlock * cell * 1.3 + surface.blend_m() / 4;
+  const double radius = 0.5 * std::sqrt(3.0) * kBlock * cell;
+  const double reach = 1.3 * radius + surface.blend_m() / 4;
+  std::vector<std::size_t> near;
   for (std::int32_t k0 = 0; k0 < nz; k0 += kBlock) {
     for (std::int32_t j0 = 0; j0 < ny; j0 += kBlock) {
       for (std::int32_t i0 = 0; i0 < nx; i0 += kBlock) {
-        const double middle = surface(grid.Corner(i0, j0, k0) + Vec3::Constant(0.5 * (kBlock - 1) * cell));
-        const bool near = std::abs(middle) < reach;
+        const double middle = surface.Near(grid.Corner(i0, j0, k0) + Vec3::Constant(0.5 * (kBlock - 1) * cell), radius, near);
+        const bool crossed = std::abs(middle) < reach;
         for (std::int32_t k = k0; k < std::min(k0 + kBlock, nz); ++k) {
           for (std::int32_t j = j0; j < std::min(j0 + kBlock, ny); ++j) {
             for (std::int32_t i = i0; i < std::min(i0 + kBlock, nx); ++i) {
-              grid.values[grid.Index(i, j, k)] = static_cast<float>(near ? surface(grid.Corner(i, j, k)) : middle);
+              grid.values[grid.Index(i, j, k)] = static_cast<float>(crossed ? surface.Value(grid.Corner(i, j, k), near) : middle);
             }
           }
         }
@@ -139,11 +141,13 @@ void JoinVertices(const Grid& grid, const std::vector<std::int32_t>& vertex_of_c
 /// Slides each vertex towards the mean of its neighbours and back onto the level, which takes the grid's pattern out of the mesh.
 void SpreadVertices(const ImplicitSurface& surface, double cell, geometry::TriangleMesh& mesh) {
   constexpr int kRounds = 3, kReturns = 2;
+  std::vector<std::vector<std::size_t>> near(mesh.vertices.size());
+  for (std::size_t v = 0; v < near.size(); ++v) surface.Near(mesh.vertices[v], 2 * cell, near[v]);
   // The level's value is a distance to first order, so the mesh's own normals lead back to it.
   const auto back_onto_level = [&] {
     const std::vector<Vec3> normals = geometry::VertexNormals(mesh);
     for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
-      mesh.vertices[v] -= std::clamp(surface(mesh.vertices[v]), -0.7 * cell, 0.7 * cell) * normals[v];
+      mesh.vertices[v] -= std::clamp(surface.Value(mesh.vertices[v], near[v]), -0.7 * cell, 0.7 * cell) * normals[v];
     }
   };
   for (int round = 0; round < kRounds; ++round) {
@@ -176,22 +180,25 @@ double Blob::Distance(const Vec3& x) const {
 }
 
 void ImplicitSurface::Add(const Blob& blob) {
+  all_.push_back(blobs_.size());
   blobs_.push_back(blob);
   const double radius = std::max(blob.from_radius, blob.to_radius) * blob.stretch.maxCoeff();
   around_.push_back({0.5 * (blob.from + blob.to), 0.5 * (blob.to - blob.from).norm() + radius});
 }
 
-double ImplicitSurface::operator()(const Vec3& x) const {
+double ImplicitSurface::Value(const Vec3& x, std::span<const std::size_t> near) const {
   constexpr double kFar = 1e9;
   const auto melt = [](double a, double b, double width) {
     const double h = std::max(width - std::abs(a - b), 0.0) / width;
     return std::min(a, b) - h * h * width / 4;
   };
   double whole = kFar, limb = kFar;
-  for (std::size_t i = 0; i < blobs_.size(); ++i) {
-    if (i > 0 && (blobs_[i].limb < 0 || blobs_[i].limb != blobs_[i - 1].limb)) {
+  std::int32_t current = -1;
+  for (const std::size_t i : near) {
+    if (blobs_[i].limb < 0 || blobs_[i].limb != current) {
       whole = melt(whole, limb, blend_);
       limb = kFar;
+      current = blobs_[i].limb;
     }
     // A blob farther than this changes nothing.
     const double reach = std::min(whole, limb) + 2 * blend_ + around_[i].radius;
@@ -199,6 +206,16 @@ double ImplicitSurface::operator()(const Vec3& x) const {
     limb = melt(limb, blobs_[i].Distance(x), seam_);
   }
   return std::max(melt(whole, limb, blend_), floor_ - x.y());
+}
+
+double ImplicitSurface::Near(const Vec3& x, double radius, std::vector<std::size_t>& near) const {
+  const double value = Value(x, all_);
+  near.clear();
+  for (std::size_t i = 0; i < around_.size(); ++i) {
+    const double reach = value + 2 * radius + 2 * blend_ + around_[i].radius;
+    if (reach > 0 && (x - around_[i].centre).squaredNorm() < reach * reach) near.push_back(i);
+  }
+  return value;
 }
 
 Box3 ImplicitSurface::Bounds() const {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "services/geometry/triangle_mesh.h"
@@ -33,7 +34,11 @@ class ImplicitSurface {
   const std::vector<Blob>& blobs() const { return blobs_; }
   double blend_m() const { return blend_; }
 
-  double operator()(const geometry::Vec3& x) const;
+  double operator()(const geometry::Vec3& x) const { return Value(x, all_); }
+  /// The same from those blobs alone that count at x, in ascending order.
+  double Value(const geometry::Vec3& x, std::span<const std::size_t> near) const;
+  /// The value at x, and which blobs count within `radius` of it.
+  double Near(const geometry::Vec3& x, double radius, std::vector<std::size_t>& near) const;
   geometry::Box3 Bounds() const;
 
  private:
@@ -43,7 +48,8 @@ class ImplicitSurface {
   };
   double blend_, seam_, floor_;
   std::vector<Blob> blobs_;
-  std::vector<Ball> around_;  // encloses the blob of the same index
+  std::vector<std::size_t> all_;  // 0, 1, 2 …
+  std::vector<Ball> around_;      // encloses the blob of the same index
 };
 
 /// The zero level as a closed mesh, outward, one vertex a crossed grid cell (surface nets), vertices spread evenly and moved onto the level. A

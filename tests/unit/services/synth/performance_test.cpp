@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "services/synth/choreography.h"
+#include "services/synth/depth_cameras.h"
 #include "services/synth/synth.h"
 #include "tests/unit/services/synth/closest_point.h"
 
@@ -137,6 +138,27 @@ TEST(Dance, TheCageHangsFree) {
     double nearest = 1e9;
     for (std::size_t v = dance.cage_begin(); v < end; ++v) nearest = std::min(nearest, dancer.Distance(vertices[v]));
     EXPECT_GT(nearest, 0.030) << frame;
+  }
+}
+
+TEST(Dance, LegsStayUnderTheSkirtAndArmsOutOfIt) {
+  const Dance& dance = SixSeconds();
+  for (const std::int32_t frame : {8, 60, 110, 145}) {
+    const std::vector<Vec3> vertices = dance.VerticesAt(frame);
+    geometry::Box3 box;
+    for (const Vec3& x : vertices) box.extend(x);
+    DepthScanner scanner(dance.surface(), box, {});
+    const std::vector<char> seen = scanner.Seen(vertices);
+    const ClosestPoint skirt(Shell(dance, vertices, dance.skirt_begin(), dance.cage_begin()));
+    for (std::size_t v = 0; v < dance.skirt_begin(); ++v) {
+      const auto part = static_cast<Part>(dance.part()[v]);
+      if (part == Part::kLeftLeg || part == Part::kRightLeg) {
+        EXPECT_FALSE(seen[v] && vertices[v].y() > 0.70) << frame;  // the hem hangs at about 0.55 m, and lifts when it swings
+      }
+      if (part == Part::kLeftArm || part == Part::kRightArm) {
+        EXPECT_GT(skirt.Distance(vertices[v]), 0.03) << frame;
+      }
+    }
   }
 }
 
