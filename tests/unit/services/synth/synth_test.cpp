@@ -182,7 +182,7 @@ TEST(SynthesiseCapture, RefusesWhatItCannotDoAndSaysWhy) {
 TEST(ScanMeshes, KeepsEveryVertexInMetresAndTheSourcesRate) {
   const fs::path meshes = TetrahedronTake("cm", 4), folder = FreshFolder("cm_scanned");
   capture::CaptureOptions source{.frames_per_second = 50, .unit = "cm", .first = 1, .last = 3};
-  // Half a centimetre is smaller than a capture can be: in decimetres it would do, so ask for metres after seeing the refusal.
+  // Read as centimetres the tetrahedron is smaller than a capture can be, and the reader says so.
   EXPECT_FALSE(ScanMeshes(meshes, source, folder, {.points = 1000}).ok());
   source.unit = "m";
   ASSERT_TRUE(ScanMeshes(meshes, source, folder, {.points = 1000}).ok());
