@@ -4,6 +4,7 @@
 #include <BulletCollision/BroadphaseCollision/btDispatcher.h>
 #include <BulletCollision/CollisionDispatch/btCollisionObjectWrapper.h>
 #include <BulletCollision/CollisionDispatch/btManifoldResult.h>
+#include <BulletCollision/CollisionShapes/btStaticPlaneShape.h>
 #include <LinearMath/btConvexHullComputer.h>
 
 #include <limits>
@@ -16,7 +17,10 @@ namespace {
 using Eigen::Matrix3f;
 using Eigen::Vector3f;
 
+constexpr float kContactDistance = 0.02F;  // Bullet units between the skins; Bullet's boxes reach as far
+
 Vector3f ToEigen(const btVector3& v) { return {v.x(), v.y(), v.z()}; }
+btVector3 ToBullet(const Vector3f& v) { return {v.x(), v.y(), v.z()}; }
 Matrix3f ToEigen(const btMatrix3x3& m) {
   Matrix3f result;
   for (int row = 0; row < 3; ++row) result.row(row) << m[row].x(), m[row].y(), m[row].z();
@@ -42,11 +46,62 @@ CellHull::Faces DistancesToFaces(const CellHull& a, const CellHull& b, const Mat
 
 Vector3f Corner(const CellHull& hull, int i) { return {hull.corner_x[i], hull.corner_y[i], hull.corner_z[i]}; }
 
-/// The hull's corner farthest along a direction of its own frame.
-int FarthestCorner(const CellHull& hull, const Vector3f& direction) {
-  int farthest = 0;
-  (direction.x() * hull.corner_x + direction.y() * hull.corner_y + direction.z() * hull.corner_z).maxCoeff(&farthest);
-  return farthest;
+/// A hull's corners along a direction of its own frame.
+CellHull::Corners Along(const CellHull& hull, const Vector3f& direction) {
+  return direction.x() * hull.corner_x + direction.y() * hull.corner_y + direction.z() * hull.corner_z;
+}
+
+/// The corners of `other` that lie below a face of `reference`, no deeper sideways outside than they may be rounded: the deepest first, then
+/// those spread farthest.
+void TouchFace(const CellHull& reference, int face, const CellHull& other, const btTransform& world_from_other, const Matrix3f& reference_from_other,
+               const Vector3f& other_origin_in_reference, float enough, Separation& found) {
+  constexpr float kSideways = 0.05F;  // Bullet units
+  const Vector3f normal(reference.normal_x[face], reference.normal_y[face], reference.normal_z[face]);
+  struct Candidate {
+    Vector3f point;  // in the reference's frame
+    float distance;
+    int corner;
+  };
+  Candidate candidates[CellHull::kCorners];
+  int count = 0;
+  int deepest = 0;
+  for (int i = 0; i < other.corner_count; ++i) {
+    const Vector3f point = reference_from_other * Corner(other, i) + other_origin_in_reference;
+    const float distance = normal.dot(point) - reference.plane_offset[face];
+    if (distance > enough) continue;
+    candidates[count] = {point, distance, i};
+    if (distance < candidates[deepest].distance) deepest = count;
+    ++count;
+  }
+  // Sideways outside the reference a corner does not touch it; the deepest stands for the pair in any case.
+  int kept = 0;
+  for (int i = 0; i < count; ++i) {
+    const Vector3f& p = candidates[i].point;
+    const bool inside =
+        i == deepest || (p.x() * reference.normal_x + p.y() * reference.normal_y + p.z() * reference.normal_z - reference.plane_offset).maxCoeff() <
+                            std::max(enough, kSideways);
+    if (!inside) continue;
+    if (i == deepest) deepest = kept;
+    candidates[kept++] = candidates[i];
+  }
+  std::swap(candidates[0], candidates[deepest]);
+  for (int chosen = 1; chosen < std::min(kept, Separation::kTouchesMax); ++chosen) {
+    int farthest = chosen;
+    float farthest_distance = -1;
+    for (int i = chosen; i < kept; ++i) {
+      float nearest = std::numeric_limits<float>::max();
+      for (int j = 0; j < chosen; ++j) nearest = std::min(nearest, (candidates[i].point - candidates[j].point).squaredNorm());
+      if (nearest > farthest_distance) {
+        farthest_distance = nearest;
+        farthest = i;
+      }
+    }
+    std::swap(candidates[chosen], candidates[farthest]);
+  }
+  found.touch_count = std::min(kept, Separation::kTouchesMax);
+  const Matrix3f rotation = ToEigen(world_from_other.getBasis());
+  const Vector3f origin = ToEigen(world_from_other.getOrigin());
+  for (int i = 0; i < found.touch_count; ++i) found.touches[i] = {rotation * Corner(other, candidates[i].corner) + origin, candidates[i].distance};
 }
 
 }  // namespace
@@ -64,6 +119,7 @@ CellHull::CellHull(const CellShape& shape, float units) {
     addPoint(btVector3(corner.x(), corner.y(), corner.z()), false);
     coordinates.insert(coordinates.end(), {corner.x(), corner.y(), corner.z()});
   }
+  for (const geometry::Vec3& corner : shape.all_corners) all_corners.push_back(units * corner.cast<float>());
   setMargin(units * static_cast<float>(kHullMargin));
   recalcLocalAabb();
 
@@ -120,27 +176,36 @@ Separation FindSeparation(const CellHull& a, const btTransform& world_from_a, co
   const float distance_b = DistancesToFaces(b, a, b_from_a, a_origin_in_b).maxCoeff(&face_b);
   if (distance_b > enough) return {.distance = distance_b, .axis = CellHull::kFaces + face_b};
 
+  Separation found;
   const float length = between.norm();
   const Vector3f line = length > 0 ? Vector3f(between / length) : Vector3f(Vector3f::UnitY());
-  const int tip_of_a = FarthestCorner(a, rotation_a.transpose() * line);
-  const int tip_of_b = FarthestCorner(b, -(rotation_b.transpose() * line));
-  const Vector3f tip_a = rotation_a * Corner(a, tip_of_a) + ToEigen(world_from_a.getOrigin());
-  const Vector3f tip_b = rotation_b * Corner(b, tip_of_b) + ToEigen(world_from_b.getOrigin());
-  const float distance_line = line.dot(tip_b - tip_a);
-
+  int tip = 0;
+  const float reach_a = Along(a, rotation_a.transpose() * line).maxCoeff();
+  const float reach_b = -Along(b, rotation_b.transpose() * line).minCoeff(&tip);
+  const float distance_line = length - reach_a - reach_b;
   if (distance_line > std::max(distance_a, distance_b)) {
-    return {.distance = distance_line, .normal = -line, .point = tip_b, .point_of_b = true, .axis = -1};
+    found.distance = distance_line;
+    found.normal = -line;
+    if (distance_line <= enough) {
+      found.touches[0] = {rotation_b * Corner(b, tip) + ToEigen(world_from_b.getOrigin()), distance_line};
+      found.touch_count = 1;
+    }
+    return found;
   }
-  if (distance_a >= distance_b) {
-    const Vector3f normal(a.normal_x[face_a], a.normal_y[face_a], a.normal_z[face_a]);
-    const int deepest = FarthestCorner(b, -(b_from_a * normal));
-    const Vector3f point = rotation_b * Corner(b, deepest) + ToEigen(world_from_b.getOrigin());
-    return {.distance = distance_a, .normal = -(rotation_a * normal), .point = point, .point_of_b = true, .axis = face_a};
+  const bool face_of_a = distance_a >= distance_b;
+  const CellHull& reference = face_of_a ? a : b;
+  const int face = face_of_a ? face_a : face_b;
+  const Vector3f normal(reference.normal_x[face], reference.normal_y[face], reference.normal_z[face]);
+  found.distance = face_of_a ? distance_a : distance_b;
+  found.normal = face_of_a ? Vector3f(-(rotation_a * normal)) : Vector3f(rotation_b * normal);
+  found.axis = face_of_a ? face : CellHull::kFaces + face;
+  found.corners_of_b = face_of_a;
+  if (face_of_a) {
+    TouchFace(a, face, b, world_from_b, a_from_b, b_origin_in_a, enough, found);
+  } else {
+    TouchFace(b, face, a, world_from_a, b_from_a, a_origin_in_b, enough, found);
   }
-  const Vector3f normal(b.normal_x[face_b], b.normal_y[face_b], b.normal_z[face_b]);
-  const int deepest = FarthestCorner(a, -(a_from_b * normal));
-  const Vector3f point = rotation_a * Corner(a, deepest) + ToEigen(world_from_a.getOrigin());
-  return {.distance = distance_b, .normal = rotation_b * normal, .point = point, .point_of_b = false, .axis = CellHull::kFaces + face_b};
+  return found;
 }
 
 CellCollision::~CellCollision() {
@@ -152,28 +217,70 @@ void CellCollision::processCollision(const btCollisionObjectWrapper* a, const bt
   const auto& hull_a = static_cast<const CellHull&>(*a->getCollisionShape());
   const auto& hull_b = static_cast<const CellHull&>(*b->getCollisionShape());
   const float margins = hull_a.getMarginNonVirtual() + hull_b.getMarginNonVirtual();
-  constexpr float kContactDistance = 0.02F;  // Bullet's own threshold for a contact to begin
-  const Separation found = FindSeparation(hull_a, a->getWorldTransform(), hull_b, b->getWorldTransform(), margins + kContactDistance, last_axis_);
+  const float enough = margins + kContactDistance;
+  const Separation found = FindSeparation(hull_a, a->getWorldTransform(), hull_b, b->getWorldTransform(), enough, last_axis_);
   last_axis_ = found.axis;
-  if (found.distance > margins + kContactDistance) {
+  if (found.touch_count == 0) {
     if (manifold_ != nullptr) m_dispatcher->releaseManifold(manifold_);
     manifold_ = nullptr;
     return;
   }
   if (manifold_ == nullptr) manifold_ = m_dispatcher->getNewManifold(a->getCollisionObject(), b->getCollisionObject());
   result->setPersistentManifold(manifold_);
-  const float depth = found.distance - margins;
-  const btVector3 normal(found.normal.x(), found.normal.y(), found.normal.z());
-  const btVector3 corner(found.point.x(), found.point.y(), found.point.z());
-  // Bullet wants the point on b's skin; a's lies `depth` along the normal from it.
-  const btVector3 on_b = found.point_of_b ? corner + normal * hull_b.getMarginNonVirtual() : corner - normal * (hull_a.getMarginNonVirtual() + depth);
-  result->addContactPoint(normal, on_b, depth);
+  const btVector3 normal = ToBullet(found.normal);
+  for (int i = 0; i < found.touch_count; ++i) {
+    const float depth = found.touches[i].distance - margins;
+    const btVector3 corner = ToBullet(found.touches[i].point);
+    // Bullet wants the point on b's skin; a's lies `depth` along the normal from it.
+    const btVector3 on_b =
+        found.corners_of_b ? corner + normal * hull_b.getMarginNonVirtual() : corner - normal * (hull_a.getMarginNonVirtual() + depth);
+    result->addContactPoint(normal, on_b, depth);
+  }
   result->refreshContactPoints();
 }
 
 btCollisionAlgorithm* CellCollision::Factory::CreateCollisionAlgorithm(btCollisionAlgorithmConstructionInfo& info, const btCollisionObjectWrapper*,
                                                                        const btCollisionObjectWrapper*) {
   return new (info.m_dispatcher1->allocateCollisionAlgorithm(sizeof(CellCollision))) CellCollision(info);
+}
+
+CellPlaneCollision::~CellPlaneCollision() {
+  if (manifold_ != nullptr) m_dispatcher->releaseManifold(manifold_);
+}
+
+void CellPlaneCollision::processCollision(const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b, const btDispatcherInfo&,
+                                          btManifoldResult* result) {
+  const btCollisionObjectWrapper& cell = swapped_ ? *b : *a;
+  const btCollisionObjectWrapper& ground = swapped_ ? *a : *b;
+  const auto& hull = static_cast<const CellHull&>(*cell.getCollisionShape());
+  const auto& plane = static_cast<const btStaticPlaneShape&>(*ground.getCollisionShape());
+  const btVector3 normal = ground.getWorldTransform().getBasis() * plane.getPlaneNormal();
+  const float offset = plane.getPlaneConstant() + normal.dot(ground.getWorldTransform().getOrigin()) + hull.getMarginNonVirtual();
+
+  const Vector3f up = ToEigen(cell.getWorldTransform().getBasis().transpose() * normal);
+  const float centre = normal.dot(cell.getWorldTransform().getOrigin()) - offset;
+  bool touches = false;
+  for (const Vector3f& corner : hull.all_corners) {
+    const float depth = centre + up.dot(corner);
+    if (depth > kContactDistance) continue;
+    if (manifold_ == nullptr) manifold_ = m_dispatcher->getNewManifold(a->getCollisionObject(), b->getCollisionObject());
+    if (!touches) result->setPersistentManifold(manifold_);
+    touches = true;
+    const btVector3 on_cell = cell.getWorldTransform() * ToBullet(corner) - normal * hull.getMarginNonVirtual();
+    // The normal points from b to a, the point is b's.
+    result->addContactPoint(swapped_ ? -normal : normal, swapped_ ? on_cell : on_cell - normal * depth, depth);
+  }
+  if (touches) {
+    result->refreshContactPoints();
+  } else if (manifold_ != nullptr) {
+    m_dispatcher->releaseManifold(manifold_);
+    manifold_ = nullptr;
+  }
+}
+
+btCollisionAlgorithm* CellPlaneCollision::Factory::CreateCollisionAlgorithm(btCollisionAlgorithmConstructionInfo& info,
+                                                                            const btCollisionObjectWrapper*, const btCollisionObjectWrapper*) {
+  return new (info.m_dispatcher1->allocateCollisionAlgorithm(sizeof(CellPlaneCollision))) CellPlaneCollision(info, m_swapped);
 }
 
 }  // namespace vorocast::simulation

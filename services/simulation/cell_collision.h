@@ -6,6 +6,7 @@
 #include <BulletCollision/CollisionShapes/btConvexHullShape.h>
 
 #include <Eigen/Core>
+#include <vector>
 
 #include "services/simulation/cell_shapes.h"
 
@@ -14,8 +15,8 @@ namespace vorocast::simulation {
 /// A cell's hull for Bullet, with its corners and face planes laid out for vector instructions.
 class CellHull : public btConvexHullShape {
  public:
-  static constexpr int kCorners = 16;  // room for them; the rest repeats the first
-  static constexpr int kFaces = 24;    // room for a triangulated hull of 12 corners; the rest are planes that nothing is outside of
+  static constexpr int kCorners = kHullCorners;  // the rest repeats the first
+  static constexpr int kFaces = 32;              // room for a triangulated hull; the rest are planes that nothing is outside of
   // Unaligned, because Bullet's shapes bring an operator new of their own that aligns to 16 bytes only.
   using Corners = Eigen::Array<float, kCorners, 1, Eigen::DontAlign>;
   using Faces = Eigen::Array<float, kFaces, 1, Eigen::DontAlign>;
@@ -23,9 +24,15 @@ class CellHull : public btConvexHullShape {
   /// `units`: Bullet units a metre.
   CellHull(const CellShape& shape, float units);
 
+  /// How far contact points may drift before they are dropped. Bullet's own two hundredths of the size lets a rolling lump lose all but the
+  /// newest of its contacts, and it sinks.
+  btScalar getContactBreakingThreshold(btScalar) const override { return kBreakingThreshold; }
+  static constexpr float kBreakingThreshold = 0.25F;  // Bullet units
+
   Corners corner_x, corner_y, corner_z;              // body frame, Bullet units, without margin
   Faces normal_x, normal_y, normal_z, plane_offset;  // outwards: a face's points have normal·x = offset
   int corner_count = 0;
+  std::vector<Eigen::Vector3f> all_corners;  // with those that the hull was thinned out of: the ground is flat, and shows what sinks into it
 };
 
 /// Contacts between two cells by separating axes: the face normals of both hulls and the line between the centres. Leaving out the
@@ -54,14 +61,48 @@ class CellCollision : public btCollisionAlgorithm {
   int last_axis_ = -1;                        // face of a, or kFaces + face of b, that separated the pair
 };
 
+/// Contacts between a cell and an endless plane: each corner that touches it, at once.
+class CellPlaneCollision : public btCollisionAlgorithm {
+ public:
+  CellPlaneCollision(const btCollisionAlgorithmConstructionInfo& info, bool swapped) : btCollisionAlgorithm(info), swapped_(swapped) {}
+  ~CellPlaneCollision() override;
+
+  void processCollision(const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b, const btDispatcherInfo& info,
+                        btManifoldResult* result) override;
+  btScalar calculateTimeOfImpact(btCollisionObject*, btCollisionObject*, const btDispatcherInfo&, btManifoldResult*) override { return 1; }
+  void getAllContactManifolds(btManifoldArray& manifolds) override {
+    if (manifold_ != nullptr) manifolds.push_back(manifold_);
+  }
+
+  /// m_swapped: the plane comes first.
+  struct Factory : btCollisionAlgorithmCreateFunc {
+    btCollisionAlgorithm* CreateCollisionAlgorithm(btCollisionAlgorithmConstructionInfo& info, const btCollisionObjectWrapper* a,
+                                                   const btCollisionObjectWrapper* b) override;
+  };
+
+ private:
+  btPersistentManifold* manifold_ = nullptr;
+  bool swapped_;
+};
+
+/// Where two hulls touch, in the world and without margins.
+struct Touch {
+  Eigen::Vector3f point;  // a corner of one of them
+  float distance;         // from the other, along the normal; negative inside
+};
+
 /// The axis on which two hulls are farthest apart, or least deep in each other.
 struct Separation {
-  float distance;          // between the hulls without margins; negative inside
-  Eigen::Vector3f normal;  // from b to a, in the world
-  Eigen::Vector3f point;   // deepest corner, in the world
-  bool point_of_b;         // whose corner it is
-  int axis;                // as CellCollision::last_axis_; −1 for the line between the centres
+  static constexpr int kTouchesMax = 4;
+
+  float distance = 0;                                // between the hulls without margins; negative inside
+  int axis = -1;                                     // as CellCollision::last_axis_; −1 for the line between the centres
+  Eigen::Vector3f normal = Eigen::Vector3f::Zero();  // from b to a, in the world
+  bool corners_of_b = true;                          // whose corners the touches are
+  int touch_count = 0;                               // 0 when farther apart than `enough`
+  Touch touches[kTouchesMax];                        // the deepest first
 };
+
 /// `last_axis`: tried first; when it shows more than `enough`, the search ends there.
 Separation FindSeparation(const CellHull& a, const btTransform& world_from_a, const CellHull& b, const btTransform& world_from_b, float enough,
                           int last_axis);

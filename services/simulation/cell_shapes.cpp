@@ -16,7 +16,6 @@ using geometry::Mat3;
 using geometry::Quat;
 using geometry::Vec3;
 
-constexpr std::size_t kCornersMax = 12;   // more cost time and change nothing that is seen
 constexpr double kExtentMin = 0.001;      // metres; thinner is not simulated
 constexpr double kMassFloor = 0.01;       // of the mean mass
 constexpr double kInertiaRatioMin = 0.1;  // smallest principal moment by the largest: needles and plates would spin wildly
@@ -79,14 +78,14 @@ Hull MakeHull(const std::vector<Vec3>& corners, double shrink) {
   return hull;
 }
 
-/// At most kCornersMax of the corners, spread out: each next one is the farthest from those chosen.
+/// At most kHullCorners of the corners, spread out: each next one is the farthest from those chosen.
 std::vector<Vec3> ThinOut(const std::vector<Vec3>& corners) {
-  if (corners.size() <= kCornersMax) return corners;
+  if (corners.size() <= kHullCorners) return corners;
   std::vector<Vec3> chosen;
   std::vector<double> distance(corners.size(), std::numeric_limits<double>::max());
   const auto farther = [](const Vec3& a, const Vec3& b) { return a.squaredNorm() < b.squaredNorm(); };
   auto next = static_cast<std::size_t>(std::ranges::max_element(corners, farther) - corners.begin());
-  while (chosen.size() < kCornersMax) {
+  while (chosen.size() < kHullCorners) {
     chosen.push_back(corners[next]);
     for (std::size_t i = 0; i < corners.size(); ++i) distance[i] = std::min(distance[i], (corners[i] - chosen.back()).squaredNorm());
     next = static_cast<std::size_t>(std::ranges::max_element(distance) - distance.begin());
@@ -129,6 +128,7 @@ CellShape BoxInstead(const std::vector<Vec3>& corners, double mass, double shrin
   const Vec3 extent = corners.empty() ? Vec3(Vec3::Zero()) : Extent(turned);
   const Vec3 half = (0.5 * extent - Vec3::Constant(shrink)).cwiseMax(0.5 * kExtentMin);
   shape.hull = BoxCorners(half);
+  shape.all_corners = shape.hull;
   const Vec3 squares = half.cwiseAbs2();
   shape.mass = mass;
   shape.inertia = mass / 3 * (Vec3::Constant(squares.sum()) - squares);
@@ -145,6 +145,7 @@ CellShape MakeCellShape(const Cells& cells, std::size_t c, double mass, double s
   const PrincipalAxes axes = Diagonalise(whole.covariance);
   shape.cell_from_body = axes.cell_from_body;
   for (const Vec3& corner : ThinOut(shrunk.corners)) shape.hull.push_back(shape.cell_from_body.conjugate() * corner);
+  for (const Vec3& corner : shrunk.corners) shape.all_corners.push_back(shape.cell_from_body.conjugate() * corner);
   if (Extent(shape.hull).minCoeff() < kExtentMin) return BoxInstead(corners, mass, shrink);
   shape.mass = mass;
   shape.inertia = mass / whole.volume * (Vec3::Constant(axes.moments.sum()) - axes.moments);
@@ -164,7 +165,7 @@ std::vector<CellShape> MakeCellShapes(const Cells& cells, const CellSettings& se
     const double mass = settings.density_kg_m3 * std::max(cells.volume[c], smallest_volume);
     CellShape shape = MakeCellShape(cells, c, mass, shrink);
     shape.inertia = shape.inertia.cwiseMax(kInertiaRatioMin * shape.inertia.maxCoeff());
-    for (const Vec3& corner : shape.hull) shape.radius = std::max(shape.radius, corner.norm() + kHullMargin);
+    for (const Vec3& corner : shape.all_corners) shape.radius = std::max(shape.radius, corner.norm() + kHullMargin);
     shapes.push_back(std::move(shape));
   }
   return shapes;

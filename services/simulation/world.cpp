@@ -78,6 +78,8 @@ struct ObjectBody {
 struct World::Bodies {
   btDefaultCollisionConfiguration configuration;
   CellCollision::Factory cell_collisions;
+  CellPlaneCollision::Factory cell_plane_collisions;
+  CellPlaneCollision::Factory plane_cell_collisions;
   btCollisionDispatcher dispatcher{&configuration};
   NearPairBroadphase broadphase;
   btSequentialImpulseConstraintSolver solver;
@@ -105,6 +107,10 @@ World::World(double gravity, std::optional<double> ground_height, const Surface&
   b.gravity = LengthToBullet(Vec3(0, -gravity, 0));
   b.world.setGravity(b.gravity);
   b.dispatcher.registerCollisionCreateFunc(CONVEX_HULL_SHAPE_PROXYTYPE, CONVEX_HULL_SHAPE_PROXYTYPE, &b.cell_collisions);
+  b.plane_cell_collisions.m_swapped = true;
+  b.dispatcher.registerCollisionCreateFunc(CONVEX_HULL_SHAPE_PROXYTYPE, STATIC_PLANE_PROXYTYPE, &b.cell_plane_collisions);
+  b.dispatcher.registerCollisionCreateFunc(STATIC_PLANE_PROXYTYPE, CONVEX_HULL_SHAPE_PROXYTYPE, &b.plane_cell_collisions);
+  b.configuration.setPlaneConvexMultipointIterations();
   b.world.setForceUpdateAllAabbs(false);
   b.world.getDispatchInfo().m_useContinuous = false;
   b.world.getSolverInfo().m_numIterations = kSolverIterations;
