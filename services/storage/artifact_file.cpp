@@ -38,6 +38,11 @@ absl::StatusOr<Hdf5Reader> OpenArtifact(const std::filesystem::path& path, std::
   return reader;
 }
 
+absl::StatusOr<std::string> ReadContent(const std::filesystem::path& path) {
+  ASSIGN_OR_RETURN(const Hdf5Reader reader, Hdf5Reader::Open(path));
+  return CheckRoot(reader);
+}
+
 absl::Status RefuseToWrite(const std::filesystem::path& path, const std::string& fault) {
   if (fault.empty()) return absl::OkStatus();
   return absl::InternalError(fmt::format("{}: not written: {}", path.string(), fault));
@@ -58,14 +63,13 @@ absl::StatusOr<Provenance> ReadProvenance(const std::filesystem::path& path) {
 
 absl::Status CheckArtifact(const std::filesystem::path& path) {
   RETURN_IF_ERROR(ReadProvenance(path).status());
-  ASSIGN_OR_RETURN(const Hdf5Reader reader, Hdf5Reader::Open(path));
-  ASSIGN_OR_RETURN(const std::string content, CheckRoot(reader));
+  ASSIGN_OR_RETURN(const std::string content, ReadContent(path));
   if (content == kCellsContent) return ReadCells(path).status();
   if (content == kTemplateContent) return ReadTemplate(path).status();
   if (content == kPosesContent) return ReadPoseTrack(path).status();
   if (content == kTrackedContent) return ReadTrackedTake(path).status();
   if (content == kSimulatedContent) return ReadSimulatedTake(path).status();
-  return reader.Wrong("/@content", "the file holds something unknown");
+  return absl::DataLossError(fmt::format("{}: /@content: the file holds \"{}\", which is unknown", path.string(), content));
 }
 
 }  // namespace vorocast::storage

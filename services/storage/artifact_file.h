@@ -27,6 +27,9 @@ void WriteRoot(Hdf5Writer& writer, std::string_view content, const Provenance& p
 /// Opens an artifact and refuses another format, a newer version or other content than asked for.
 absl::StatusOr<Hdf5Reader> OpenArtifact(const std::filesystem::path& path, std::string_view content);
 
+/// The content of any artifact, format and version checked.
+absl::StatusOr<std::string> ReadContent(const std::filesystem::path& path);
+
 /// INTERNAL with the path when `fault` is not empty: a kernel made a result that no reader would accept.
 absl::Status RefuseToWrite(const std::filesystem::path& path, const std::string& fault);
 

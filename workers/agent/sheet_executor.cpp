@@ -86,7 +86,7 @@ absl::StatusOr<rendering::Image> DrawTracked(const Sheet& sheet) {
     for (std::size_t c = 0; c < take.cell_count(); ++c) picture.world_from_template.push_back(take.CellPose(f, c));
     const double time = (take.patches.frames[f] - take.patches.frames[0]) / take.frames_per_second;
     const bool interpolated = take.patches.state[f] == geometry::FrameState::kInterpolated;
-    picture.label = fmt::format("frame {} · {:.2f} s{}", take.patches.frames[f], time, interpolated ? " · interpolated" : "");
+    picture.label = fmt::format("frame {}, {:.2f} s{}", take.patches.frames[f], time, interpolated ? ", interpolated" : "");
     pictures.push_back(std::move(picture));
   }
   if (pictures.empty()) return absl::FailedPreconditionError("the take has no frame, so there is nothing to draw");
