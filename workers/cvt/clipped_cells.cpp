@@ -42,8 +42,8 @@ absl::Status ClippedCells::Evaluate(const std::vector<Vec3>& sites, ClippedCompl
   complex_ = complex;
   if (Attempt()) return absl::OkStatus();
   // Either the surface crosses itself, so that the winding must be looked up, or a tie must be broken.
-  if (!rays_) {
-    rays_ = std::make_unique<XRays>(solid_.vertices, solid_.triangles);
+  if (!by_rays_) {
+    by_rays_ = true;
     if (Attempt()) return absl::OkStatus();
   }
   double shift = 1e-9 * solid_.Spacing(sites.size());
@@ -233,27 +233,45 @@ bool ClippedCells::AddFaces() {
   for (std::int32_t i = 0; i < n; ++i) {
     if (boundary_[i] && !AddBoundaryCell(i)) return false;
   }
-  // Whole cells are inside unless a boundary cell says otherwise; what it says holds for all that are connected without surface between.
-  stack_.clear();
+  if (!FindWholeCells()) return false;
   for (std::int32_t i = 0; i < n; ++i) {
-    if (cell_winding_[i] != 1 && cell_winding_[i] != kUnknown) stack_.push_back(i);
-  }
-  while (!stack_.empty()) {
-    const std::int32_t i = stack_.back();
-    stack_.pop_back();
-    for (std::int32_t other : diagram_.names(diagram_.cell(i))) {
-      if (other < 0 || boundary_[other] || cell_winding_[other] == cell_winding_[i]) continue;
-      if (cell_winding_[other] != kUnknown) return false;
-      cell_winding_[other] = cell_winding_[i];
-      stack_.push_back(other);
-    }
-  }
-  for (std::int32_t i = 0; i < n; ++i) {
-    if (boundary_[i]) continue;
-    if (cell_winding_[i] == kUnknown) cell_winding_[i] = 1;
-    if (cell_winding_[i] != 0 && !AddInteriorCell(i)) return false;
+    if (!boundary_[i] && cell_winding_[i] != 0 && !AddInteriorCell(i)) return false;
   }
   return true;
+}
+
+/// Decides which of the cells that the surface does not touch lie inside: all, unless a boundary cell says otherwise of its neighbour, or the
+/// cell goes on beyond its reach and a ray says so; and what holds for one holds for all that are connected without surface between.
+bool ClippedCells::FindWholeCells() {
+  const auto n = static_cast<std::int32_t>(sites_.size());
+  bool all_inside = true;
+  for (std::int32_t i = 0; i < n; ++i) {
+    if (boundary_[i]) continue;
+    if (cell_winding_[i] == kUnknown && diagram_.cell(i).truncated) cell_winding_[i] = WindingAt(sites_[i]);
+    all_inside = all_inside && (cell_winding_[i] == 1 || cell_winding_[i] == kUnknown);
+  }
+  // Of two neighbours the one with the smaller reach may not know the other, so both are asked, until nothing changes.
+  for (bool changed = !all_inside; changed;) {
+    changed = false;
+    for (std::int32_t i = 0; i < n; ++i) {
+      if (boundary_[i]) continue;
+      for (std::int32_t other : diagram_.names(diagram_.cell(i))) {
+        if (other < 0 || boundary_[other] || cell_winding_[other] == cell_winding_[i]) continue;
+        if (cell_winding_[i] != kUnknown && cell_winding_[other] != kUnknown) return false;
+        cell_winding_[i] = cell_winding_[other] = std::min(cell_winding_[i], cell_winding_[other]);  // kUnknown is the largest
+        changed = true;
+      }
+    }
+  }
+  for (std::int32_t& winding : cell_winding_) {
+    if (winding == kUnknown) winding = 1;
+  }
+  return true;
+}
+
+std::int32_t ClippedCells::WindingAt(const Vec3& point) {
+  if (!rays_) rays_ = std::make_unique<XRays>(solid_.vertices, solid_.triangles);
+  return rays_->Winding(point);
 }
 
 bool ClippedCells::AddBoundaryCell(std::int32_t site) {
@@ -341,8 +359,8 @@ bool ClippedCells::FindWinding(std::int32_t site) {
     }
   }
   std::int32_t first = -lowest;
-  if (rays_) {
-    first = rays_->Winding(sites_[site] + corners[0].position);
+  if (by_rays_) {
+    first = WindingAt(sites_[site] + corners[0].position);
   } else if (highest - lowest > 1) {
     return false;
   } else if (highest == lowest) {

@@ -82,12 +82,15 @@ class ClippedCells {
   bool FindWinding(std::int32_t site);
   void AddFaceEdges(std::int32_t site);
   bool MarkNeighbours(std::int32_t site);
+  bool FindWholeCells();
   bool AddInteriorCell(std::int32_t site);
+  std::int32_t WindingAt(const geometry::Vec3& point);
 
   const Solid& solid_;
   Neighbours neighbours_;
   VoronoiDiagram diagram_;
-  std::unique_ptr<XRays> rays_;        // asked for the winding once volumes alone have not told it
+  std::unique_ptr<XRays> rays_;        // made when first asked
+  bool by_rays_ = false;               // ask for the winding of every cell: volumes alone have not told it
   std::vector<std::int32_t> nearest_;  // [mesh vertices]
   std::vector<Moments> moments_;
   std::vector<std::uint8_t> boundary_;

@@ -92,7 +92,6 @@ class Assembler {
     const auto names = clipped_.diagram().names(cell);
     const Moments& m = clipped_.moments()[site];
     cells_.sites.push_back(complex_.sites[site]);
-    cells_.volume.push_back(m.volume);
     cells_.centroid.push_back(m.volume > 0 ? Vec3(complex_.sites[site] + m.first / m.volume) : complex_.sites[site]);
     cells_.boundary.push_back(clipped_.boundary()[site]);
 
@@ -112,7 +111,22 @@ class Assembler {
       AppendFace({surface_.data() + surface_begin_[f], surface_begin_[f + 1] - surface_begin_[f]}, -1);
     }
     cells_.face_offset.push_back(static_cast<std::int64_t>(cells_.neighbour.size()));
+    cells_.volume.push_back(LastVolume());
     return true;
+  }
+
+  /// Of the polyhedron just stored, so that it agrees with its stored corners to the last digits; in a sliver of a cell, welded corners may
+  /// differ from those its moments were taken of in the tenth.
+  double LastVolume() const {
+    const Vec3& site = cells_.sites.back();
+    double six_volumes = 0;
+    for (std::int64_t f = cells_.face_offset[cells_.face_offset.size() - 2]; f < cells_.face_offset.back(); ++f) {
+      const std::int32_t* v = cells_.vertex.data() + cells_.vertex_offset[f];
+      const std::int64_t size = cells_.vertex_offset[f + 1] - cells_.vertex_offset[f];
+      const Vec3 a = cells_.vertices[v[0]] - site;
+      for (std::int64_t k = 1; k + 1 < size; ++k) six_volumes += a.dot((cells_.vertices[v[k]] - site).cross(cells_.vertices[v[k + 1]] - site));
+    }
+    return six_volumes / 6;
   }
 
   void AppendFace(std::span<const std::int32_t> polygon, std::int32_t neighbour) {
