@@ -12,6 +12,7 @@ constexpr absl::Duration kAdoption = absl::Minutes(1);
 }  // namespace
 
 void Transition::On(Restored& event) {
+  state_.adoption_ends = now_ + kAdoption;
   state_.attempt_next = state_.attempt_reserved = event.attempt_next;
   for (const RunSaved& saved : event.runs) {
     if (saved.worker.empty()) {
@@ -21,7 +22,7 @@ void Transition::On(Restored& event) {
     const auto found = state_.worker_by_name.find(saved.worker);
     const WorkerIndex worker = found == state_.worker_by_name.end() ? AddWorker(saved.worker) : found->second;
     const auto index = static_cast<RunIndex>(state_.runs.size());
-    state_.runs.push_back({.key = saved.key, .tries = saved.tries, .saved = true, .wanted_until = now_ + kAdoption});
+    state_.runs.push_back({.key = saved.key, .tries = saved.tries, .saved = true});
     state_.run_by_key.emplace(saved.key, index);
     SetRun(index, Leased{.attempt = saved.attempt, .worker = worker, .deadline = now_ + state_.settings.lease});
   }

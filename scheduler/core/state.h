@@ -89,8 +89,7 @@ struct Run {
   /// Never empty, but for a run that is still leased from before a restart and whose task has not been planned again yet.
   std::vector<TaskIndex> tasks;
   Tries tries;
-  bool saved = false;                                // the store has a RunSaved of it
-  absl::Time wanted_until = absl::InfiniteFuture();  // of a run without tasks: afterwards nobody can still want it
+  bool saved = false;  // the store has a RunSaved of it
   RunState state = LookingUp{};
 };
 
@@ -165,7 +164,8 @@ struct State {
   std::vector<Run> runs;
   std::vector<RunIndex> free_runs;
   absl::flat_hash_map<base::Digest, RunIndex> run_by_key;
-  absl::flat_hash_map<base::Digest, Tries> tries_before;  // a restart's memory of runs that nobody held
+  std::map<base::Digest, Tries> tries_before;         // a restart's memory of runs that nobody held
+  absl::Time adoption_ends = absl::InfiniteFuture();  // afterwards what a restart remembered and nobody wants is forgotten
   std::vector<Worker> workers;
   std::vector<WorkerIndex> free_workers;
   absl::flat_hash_map<std::string, WorkerIndex> worker_by_name;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include <algorithm>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -112,7 +113,7 @@ void Transition::On(Heartbeat& event) {
     const RunIndex run = FindAttempt(progress.id);
     if (run == kNone || std::get<Leased>(state_.runs[run].state).worker != index) {
       unwanted.ids.push_back(progress.id);
-    } else if (state_.runs[run].tasks.empty() && now_ > state_.runs[run].wanted_until) {
+    } else if (state_.runs[run].tasks.empty() && now_ > state_.adoption_ends) {
       Abandon(run);
     } else {
       Renew(run, now_ + state_.settings.lease, std::clamp(progress.fraction, 0.0, 1.0));
@@ -132,6 +133,9 @@ void Transition::On(Tick&) {
     }
   }
   state_.last_tick = now_;
+  if (now_ > state_.adoption_ends) {
+    for (const auto& [key, tries] : std::exchange(state_.tries_before, {})) effects_.records.emplace_back(std::in_place_type<RunEnded>, key);
+  }
   while (!state_.deadlines.empty() && state_.deadlines.begin()->first <= now_) {
     const RunIndex index = state_.deadlines.begin()->second;
     const auto* leased = std::get_if<Leased>(&state_.runs[index].state);

@@ -1,0 +1,396 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "tests/scenario/simulated_farm.h"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "scheduler/core/check.h"
+#include "scheduler/core/job_view.h"
+
+namespace vorocast::scenario {
+namespace {
+
+constexpr absl::Duration kTick = absl::Milliseconds(100);
+constexpr absl::Duration kHeartbeat = absl::Seconds(2);
+constexpr absl::Duration kPatience = absl::Minutes(30);  // of simulated calm, after which what has not ended is stuck
+constexpr std::int64_t kWorkers = 4;
+constexpr std::int64_t kKeysEvery = 97;  // steps; no divisor of anything that repeats
+
+}  // namespace
+
+SimulatedFarm::SimulatedFarm(std::uint64_t seed, Weather weather) : random_(seed), weather_(weather), calm_at_(now_ + absl::Seconds(60)) {
+  const auto count = static_cast<std::int32_t>(2 + random_.Below(9));
+  for (std::int32_t i = 0; i < count; ++i) {
+    frames_.push_back({.number = i, .blob = base::HashBytes(fmt::format("frame {}", i)), .extension = ".ply"});
+    if (Chance(weather_.bad_frame)) bad_frames_.insert(i);
+  }
+  for (std::int64_t i = 0; i < kWorkers; ++i) {
+    SimulatedWorker worker{.name = fmt::format("worker-{}", ++last_worker_), .slots = static_cast<std::int32_t>(1 + random_.Below(3))};
+    for (const tasks::Kind kind : tasks::kAllKinds) {
+      if ((kind == tasks::Kind::kSimulate) == (i == 0)) worker.kinds.push_back(kind);
+    }
+    worker.connects_at = now_ + Delay();
+    workers_.push_back(std::move(worker));
+  }
+  SubmitJobs();
+}
+
+void SimulatedFarm::SubmitJobs() {
+  const std::uint64_t count = 1 + random_.Below(3);
+  for (std::uint64_t i = 0; i < count; ++i) {
+    plan::JobSpec spec;
+    spec.window_frames = 4;
+    spec.overlap_frames = 1;
+    spec.patches = 10;
+    spec.interpolated_max = static_cast<std::int32_t>(random_.Below(4)) - 1;
+    spec.template_frame = Chance(0.5) ? 0 : -1;
+    spec.sheets = Chance(0.5);
+    spec.effect = Chance(0.5) ? nlohmann::json{{"name", "pendulum"}, {"strength", static_cast<std::int32_t>(random_.Below(2))}} : nlohmann::json();
+    memory_.jobs.push_back({.id = fmt::format("j{}", memory_.jobs.size() + 1),
+                            .user = Chance(0.5) ? "anna" : "bert",
+                            .priority = static_cast<std::int32_t>(random_.Below(2)),
+                            .spec = std::move(spec)});
+  }
+}
+
+absl::Status SimulatedFarm::Wrong(const std::string& what) const { return absl::InternalError(fmt::format("after {} steps: {}", steps_, what)); }
+
+absl::Status SimulatedFarm::Happen(core::Event event) {
+  ++steps_;
+  const auto* finished = std::get_if<core::Finished>(&event);
+  const bool succeeded = finished && std::holds_alternative<core::Succeeded>(finished->outcome);
+  const base::Digest key = finished ? finished->id.key : base::Digest{};
+  const bool is_tick = std::holds_alternative<core::Tick>(event);
+  core::Effects effects = core::Step(state_, std::move(event), now_);
+  const bool idle = is_tick && effects.records.empty() && effects.messages.empty() && effects.changed_jobs.empty();
+  if (!idle) {
+    const bool keys = steps_ % kKeysEvery == 0;
+    if (const absl::Status status = core::Check(state_, keys); !status.ok()) return Wrong(std::string(status.message()));
+  }
+  for (const core::Record& record : effects.records) {
+    const auto* made = std::get_if<core::ResultMade>(&record);
+    if (made && succeeded && made->key != key) return Wrong("a result for another key than was reported");
+  }
+  return Apply(std::move(effects));
+}
+
+absl::Status SimulatedFarm::Apply(core::Effects effects) {
+  const bool dies = !effects.records.empty() && !calm_ && Chance(weather_.scheduler_dies);
+  if (dies && Chance(0.5)) return Restart();  // before the commit: nothing of this step is remembered, nothing was sent
+  for (const core::Record& record : effects.records) {
+    if (const auto* made = std::get_if<core::ResultMade>(&record)) {
+      if (++accepted_[made->key] > 1) return Wrong(fmt::format("the result {} was accepted twice", made->key.Short()));
+    }
+    Remember(record);
+  }
+  if (dies) return Restart();  // after the commit: remembered, but nobody was told
+  for (core::Message& message : effects.messages) {
+    const auto stream = to_worker_.find(message.connection);
+    if (stream == to_worker_.end()) continue;
+    if (!calm_ && Chance(weather_.message_lost)) {
+      Break(message.connection);
+      continue;
+    }
+    const absl::Time after = stream->second.empty() ? now_ : stream->second.back().at;
+    stream->second.push_back({std::max(after, now_ + Delay()), std::move(message)});
+  }
+  for (const core::LookUp& look_up : effects.look_ups) {
+    core::LookUpAnswered answer{.key = look_up.key};
+    if (files_.contains(look_up.key)) {
+      const auto recorded = memory_.results.find(look_up.key);
+      answer.recorded = recorded != memory_.results.end();
+      answer.result = answer.recorded ? recorded->second : core::Result{.sha256 = look_up.key, .size = 1};
+    }
+    answers_.push_back({now_ + Delay(), std::move(answer)});
+  }
+  return absl::OkStatus();
+}
+
+void SimulatedFarm::Remember(const core::Record& record) {
+  const auto job = [this](const std::string& id) {
+    return std::find_if(memory_.jobs.begin(), memory_.jobs.end(), [&](const Memory::SubmittedJob& j) { return j.id == id; });
+  };
+  if (const auto* made = std::get_if<core::ResultMade>(&record)) memory_.results[made->key] = made->result;
+  if (const auto* failed = std::get_if<core::TaskFailed>(&record)) job(failed->job)->failures[failed->task] = *failed;
+  if (const auto* saved = std::get_if<core::RunSaved>(&record)) memory_.runs[saved->key] = *saved;
+  if (const auto* ended = std::get_if<core::RunEnded>(&record)) memory_.runs.erase(ended->key);
+  if (const auto* reserved = std::get_if<core::AttemptsReserved>(&record)) memory_.attempt_next = reserved->next;
+  if (const auto* cancelled = std::get_if<core::JobCancelled>(&record)) job(cancelled->job)->cancelled = true;
+  if (const auto* retried = std::get_if<core::JobRetried>(&record)) {
+    job(retried->job)->cancelled = false;
+    job(retried->job)->failures.clear();
+  }
+}
+
+absl::Status SimulatedFarm::Plan(const Memory::SubmittedJob& job) {
+  const std::vector<plan::PlannedFrame> known(frames_.begin(), frames_.begin() + static_cast<std::ptrdiff_t>(frames_known_));
+  auto planned = plan::Plan(job.spec, known, closed_);
+  if (!planned.ok()) return planned.status();
+  core::TasksAdded added{.job = job.id, .tasks = *std::move(planned), .complete = closed_};
+  if (job.spec.interpolated_max >= 0) added.bad_frames_max = job.spec.interpolated_max;
+  if (closed_) added.bad_frames_max = plan::InterpolatedMax(job.spec, static_cast<std::int32_t>(frames_.size()));
+  return Happen(std::move(added));
+}
+
+absl::Status SimulatedFarm::Restart() {
+  for (const auto& [connection, stream] : std::map(to_worker_)) Break(connection);
+  answers_.clear();
+  for (auto file = files_.begin(); file != files_.end();) {
+    if (!calm_ && accepted_.contains(*file) && Chance(weather_.file_lost)) {
+      accepted_.erase(*file);
+      file = files_.erase(file);
+    } else {
+      ++file;
+    }
+  }
+  now_ += absl::Milliseconds(static_cast<std::int64_t>(random_.Below(3000)));
+  state_ = core::State{};
+  // The restored events happen before anybody is served, so nothing may go wrong between them.
+  const double dies = std::exchange(weather_.scheduler_dies, 0);
+  core::Restored restored{.attempt_next = memory_.attempt_next};
+  for (const auto& [key, run] : memory_.runs) restored.runs.push_back(run);
+  absl::Status status = Happen(std::move(restored));
+  for (std::size_t i = 0; status.ok() && i < memory_.jobs.size(); ++i) {
+    const Memory::SubmittedJob job = memory_.jobs[i];
+    core::JobSubmitted submitted{.id = job.id, .name = "take", .user = job.user, .priority = job.priority, .cancelled = job.cancelled};
+    for (const auto& [task, failure] : job.failures) submitted.failures.push_back(failure);
+    status = Happen(std::move(submitted));
+    if (status.ok()) status = Plan(job);
+  }
+  weather_.scheduler_dies = dies;
+  return status;
+}
+
+void SimulatedFarm::Break(core::ConnectionId connection) {
+  to_worker_.erase(connection);
+  // What was on its way is lost with the stream; that it broke is noticed at once.
+  to_scheduler_[connection].clear();
+  to_scheduler_[connection].push_back({now_ + Delay(), core::WorkerDisconnected{connection}});
+  for (SimulatedWorker& worker : workers_) {
+    if (worker.connection != connection) continue;
+    worker.connection = 0;
+    worker.welcomed = false;
+    worker.connects_at = now_ + absl::Milliseconds(static_cast<std::int64_t>(random_.Below(3000)));
+  }
+}
+
+void SimulatedFarm::Post(core::ConnectionId connection, core::Event event) {
+  if (connection == 0) return;
+  if (!calm_ && Chance(weather_.message_lost)) return Break(connection);
+  auto& stream = to_scheduler_[connection];
+  const absl::Time after = stream.empty() ? now_ : stream.back().at;
+  stream.push_back({std::max(after, now_ + Delay()), std::move(event)});
+}
+
+void SimulatedFarm::Connect(SimulatedWorker& worker) {
+  worker.connection = ++last_connection_;
+  worker.beats_at = now_ + kHeartbeat;
+  to_worker_[worker.connection];
+  core::WorkerConnected hello{.connection = worker.connection, .worker = worker.name, .kinds = worker.kinds, .slots = worker.slots};
+  for (const auto& [id, attempt] : worker.held) hello.holding.push_back(id);
+  Post(worker.connection, std::move(hello));
+}
+
+void SimulatedFarm::StartAttempt(SimulatedWorker& worker, const core::Lease& lease) {
+  Attempt attempt{.id = lease.id, .spec_json = lease.spec_json};
+  attempt.ends = now_ + absl::Milliseconds(static_cast<std::int64_t>(random_.Below(4000)));
+  worker.held.emplace(lease.id, std::move(attempt));
+}
+
+core::Finished SimulatedFarm::Outcome(const SimulatedWorker& worker, const Attempt& attempt) {
+  core::Finished finished{.connection = worker.connection, .id = attempt.id};
+  const auto spec = nlohmann::json::parse(attempt.spec_json);
+  const bool is_bad = spec["kind"] == "tessellate" && bad_frames_.contains(spec["inputs"][0]["frame"].get<std::int32_t>());
+  if (is_bad) {
+    finished.outcome = core::AttemptFailed{core::Cause::kInput, "normals are not finite"};
+  } else if (!calm_ && Chance(weather_.attempt_fails)) {
+    constexpr core::Cause kCauses[] = {core::Cause::kCrashed, core::Cause::kOutOfMemory, core::Cause::kTimedOut,
+                                       core::Cause::kStore,   core::Cause::kInternal,    core::Cause::kDrained};
+    finished.outcome = core::AttemptFailed{kCauses[random_.Below(std::size(kCauses))], "bad luck"};
+  } else {
+    finished.outcome = core::Succeeded{{.sha256 = attempt.id.key, .size = 1, .seconds = 1}};
+  }
+  return finished;
+}
+
+void SimulatedFarm::MoveWorker(SimulatedWorker& worker) {
+  if (now_ < worker.silent_until) return;
+  if (!calm_) {
+    if (Chance(weather_.worker_hangs)) worker.silent_until = now_ + absl::Seconds(static_cast<std::int64_t>(random_.Below(30)));
+    if (worker.connection != 0 && Chance(weather_.stream_breaks)) Break(worker.connection);
+    if (Chance(weather_.worker_dies)) {
+      if (worker.connection != 0) Break(worker.connection);
+      worker.held.clear();
+      worker.name = fmt::format("worker-{}", ++last_worker_);
+      return;
+    }
+  }
+  if (worker.connection == 0 && now_ >= worker.connects_at) Connect(worker);
+  for (auto& [id, attempt] : worker.held) {
+    if (attempt.report || now_ < attempt.ends) continue;
+    attempt.report = Outcome(worker, attempt);
+    if (std::holds_alternative<core::Succeeded>(attempt.report->outcome)) files_.insert(id.key);
+    if (!worker.welcomed) continue;  // told after the welcome
+    const core::ConnectionId connection = worker.connection;
+    Post(connection, *attempt.report);
+    if (!calm_ && Chance(weather_.message_doubled)) Post(worker.connection, *attempt.report);
+  }
+  if (worker.welcomed && now_ >= worker.beats_at) {
+    worker.beats_at = now_ + kHeartbeat;
+    core::Heartbeat beat{.connection = worker.connection};
+    for (const auto& [id, attempt] : worker.held) {
+      if (!attempt.report) beat.progress.push_back({id, 0.5});
+    }
+    Post(worker.connection, std::move(beat));
+  }
+}
+
+void SimulatedFarm::Receive(const core::Message& message) {
+  const auto found = std::find_if(workers_.begin(), workers_.end(), [&](const SimulatedWorker& w) { return w.connection == message.connection; });
+  if (found == workers_.end()) return;
+  SimulatedWorker& worker = *found;
+  const auto drop = [&worker](const std::vector<core::AttemptId>& ids) {
+    for (const core::AttemptId& id : ids) worker.held.erase(id);
+  };
+  if (const auto* welcome = std::get_if<core::Welcome>(&message.content)) {
+    worker.welcomed = true;
+    drop(welcome->drop);
+    for (auto& [id, attempt] : worker.held) {
+      if (!attempt.report) continue;
+      attempt.report->connection = worker.connection;
+      Post(worker.connection, *attempt.report);
+    }
+  }
+  if (const auto* leases = std::get_if<core::Leases>(&message.content)) {
+    for (const core::Lease& lease : leases->leases) StartAttempt(worker, lease);
+  }
+  if (const auto* acknowledged = std::get_if<core::Acknowledge>(&message.content)) drop(acknowledged->ids);
+  if (const auto* revoke = std::get_if<core::Revoke>(&message.content)) drop(revoke->ids);
+}
+
+absl::Status SimulatedFarm::Deliver() {
+  // Streams among each other in any order: the one that is looked at first changes with every tick.
+  std::vector<core::ConnectionId> order;
+  for (const auto& [connection, stream] : to_scheduler_) order.push_back(connection);
+  for (std::size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[random_.Below(i)]);
+  for (const core::ConnectionId connection : order) {
+    auto& stream = to_scheduler_[connection];
+    while (!stream.empty() && stream.front().at <= now_) {
+      core::Event event = std::move(stream.front().event);
+      stream.pop_front();
+      const bool last = std::holds_alternative<core::WorkerDisconnected>(event);
+      RETURN_IF_ERROR(Happen(std::move(event)));
+      if (last) break;
+    }
+    if (stream.empty() && !to_worker_.contains(connection)) to_scheduler_.erase(connection);
+  }
+  while (!answers_.empty()) {
+    const std::size_t which = random_.Below(answers_.size());
+    if (answers_[which].at > now_) break;
+    core::Event event = std::move(answers_[which].event);
+    answers_.erase(answers_.begin() + static_cast<std::ptrdiff_t>(which));
+    RETURN_IF_ERROR(Happen(std::move(event)));
+  }
+  for (const auto& [connection, unused] : std::map(to_worker_)) {
+    auto stream = to_worker_.find(connection);
+    while (stream != to_worker_.end() && !stream->second.empty() && stream->second.front().at <= now_) {
+      const core::Message message = std::move(stream->second.front().message);
+      stream->second.pop_front();
+      Receive(message);
+      stream = to_worker_.find(connection);
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::Status SimulatedFarm::ActAsUser() {
+  const std::string job = memory_.jobs[random_.Below(memory_.jobs.size())].id;
+  switch (random_.Below(3)) {
+    case 0:
+      return Happen(core::CancelJob{job});
+    case 1:
+      return Happen(core::RetryJob{job});
+    default: {
+      const std::size_t before = memory_.jobs.size();
+      if (before > 5) return absl::OkStatus();
+      SubmitJobs();
+      for (std::size_t i = before; i < memory_.jobs.size(); ++i) {
+        const Memory::SubmittedJob added = memory_.jobs[i];
+        RETURN_IF_ERROR(Happen(core::JobSubmitted{.id = added.id, .name = "take", .user = added.user, .priority = added.priority}));
+        RETURN_IF_ERROR(Plan(added));
+      }
+      return absl::OkStatus();
+    }
+  }
+}
+
+absl::Status SimulatedFarm::Tick() {
+  now_ += kTick;
+  calm_ = now_ >= calm_at_;
+  // The take grows for a while, then it is closed.
+  if (!closed_ && (calm_ || Chance(0.1))) {
+    frames_known_ = std::min(frames_.size(), frames_known_ + 1 + random_.Below(3));
+    if (calm_) frames_known_ = frames_.size();
+    closed_ = frames_known_ == frames_.size() && (calm_ || Chance(0.5));
+    for (std::size_t i = 0; i < memory_.jobs.size(); ++i) RETURN_IF_ERROR(Plan(Memory::SubmittedJob(memory_.jobs[i])));
+  }
+  if (!calm_ && Chance(weather_.user_acts)) RETURN_IF_ERROR(ActAsUser());
+  for (SimulatedWorker& worker : workers_) MoveWorker(worker);
+  RETURN_IF_ERROR(Deliver());
+  return Happen(core::Tick{});
+}
+
+bool SimulatedFarm::IsOver() const {
+  if (!closed_) return false;
+  for (const core::Job& job : state_.jobs) {
+    if (core::PhaseOf(job) == core::Phase::kRunning) return false;
+  }
+  return std::all_of(workers_.begin(), workers_.end(), [](const SimulatedWorker& worker) { return worker.held.empty(); });
+}
+
+absl::Status SimulatedFarm::CheckEnd() const {
+  if (const absl::Status status = core::Check(state_); !status.ok()) return Wrong(std::string(status.message()));
+  for (const Memory::SubmittedJob& submitted : memory_.jobs) {
+    const core::Job* job = core::FindJob(state_, submitted.id);
+    if (!job) return Wrong(fmt::format("{} is not known", submitted.id));
+    const core::Phase phase = core::PhaseOf(*job);
+    const auto bad_max = plan::InterpolatedMax(submitted.spec, static_cast<std::int32_t>(frames_.size()));
+    const bool too_bad = static_cast<std::int32_t>(bad_frames_.size()) > bad_max;
+    if (phase == core::Phase::kCancelled && !submitted.cancelled) return Wrong(fmt::format("{} was cancelled by nobody", submitted.id));
+    if (phase == core::Phase::kDone && too_bad) return Wrong(fmt::format("{} is done in spite of {} bad frames", submitted.id, bad_frames_.size()));
+    if (phase == core::Phase::kFailed && !too_bad && submitted.failures.empty()) return Wrong(fmt::format("{} failed for nothing", submitted.id));
+    for (const core::TaskIndex index : job->tasks) {
+      const core::Task& task = state_.tasks[index];
+      if (!core::HasEnded(task)) return Wrong(fmt::format("{} of {} has not ended", task.name, submitted.id));
+      if (const auto* done = std::get_if<core::Done>(&task.state); done && !files_.contains(done->key))
+        return Wrong(fmt::format("{} has no file", task.name));
+    }
+  }
+  for (const auto& [key, run] : memory_.runs) {
+    if (!state_.run_by_key.contains(key) && !state_.tries_before.contains(key))
+      return Wrong(fmt::format("the run {} is on record for ever", key.Short()));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status SimulatedFarm::Run() {
+  RETURN_IF_ERROR(Happen(core::Restored{}));
+  for (std::size_t i = 0; i < memory_.jobs.size(); ++i) {
+    const Memory::SubmittedJob job = memory_.jobs[i];
+    RETURN_IF_ERROR(Happen(core::JobSubmitted{.id = job.id, .name = "take", .user = job.user, .priority = job.priority}));
+  }
+  while (!IsOver()) {
+    RETURN_IF_ERROR(Tick());
+    if (now_ > calm_at_ + kPatience) {
+      for (const core::Job& job : state_.jobs) {
+        if (core::PhaseOf(job) == core::Phase::kRunning) return Wrong(fmt::format("stuck: {}", core::Explain(state_, job)));
+      }
+      return Wrong("a worker holds something for ever");
+    }
+  }
+  return CheckEnd();
+}
+
+}  // namespace vorocast::scenario

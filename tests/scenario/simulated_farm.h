@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "absl/time/time.h"
+#include "scheduler/core/step.h"
+#include "scheduler/plan/plan.h"
+#include "services/base/random.h"
+
+/// A farm in one thread: the scheduler's core, what its store remembers, an artifact folder, workers that die and hang, and a network that
+/// loses, doubles and delays. Everything follows from the seed.
+namespace vorocast::scenario {
+
+/// How often what goes wrong, each in [0, 1] per occasion.
+struct Weather {
+  double worker_dies = 0;      // a tick
+  double worker_hangs = 0;     // a tick; for up to 30 s
+  double stream_breaks = 0;    // a tick
+  double message_lost = 0;     // which breaks the stream, as a stream loses nothing in its middle
+  double message_doubled = 0;  // a Finished, as after a reconnect
+  double attempt_fails = 0;    // for a cause drawn at random
+  double bad_frame = 0;        // a frame that fails on every attempt
+  double scheduler_dies = 0;   // a commit, before or after it
+  double file_lost = 0;        // a restart of the scheduler, per result
+  double user_acts = 0;        // a tick: cancels, retries, submits again
+};
+
+/// What the store remembers, as a plain map; survives the scheduler.
+struct Memory {
+  struct SubmittedJob {
+    std::string id;
+    std::string user;
+    std::int32_t priority = 0;
+    plan::JobSpec spec;
+    bool cancelled = false;
+    std::map<std::string, core::TaskFailed> failures;
+  };
+  std::vector<SubmittedJob> jobs;
+  std::map<base::Digest, core::Result> results;
+  std::map<base::Digest, core::RunSaved> runs;
+  std::int64_t attempt_next = 1;
+};
+
+class SimulatedFarm {
+ public:
+  SimulatedFarm(std::uint64_t seed, Weather weather);
+
+  /// Until every job has ended and every worker is idle, or something is wrong. INTERNAL says what.
+  absl::Status Run();
+
+  std::int64_t steps() const { return steps_; }
+
+ private:
+  struct Attempt {
+    core::AttemptId id;
+    std::string spec_json;
+    absl::Time ends;
+    std::optional<core::Finished> report;  // once ended
+  };
+  struct SimulatedWorker {
+    std::string name;
+    std::vector<tasks::Kind> kinds;
+    std::int32_t slots = 1;
+    core::ConnectionId connection = 0;  // 0: not connected
+    bool welcomed = false;
+    absl::Time silent_until = absl::InfinitePast();
+    absl::Time connects_at;
+    absl::Time beats_at;
+    std::map<core::AttemptId, Attempt> held;
+  };
+  /// On its way to the scheduler, in the order of its stream.
+  struct ToScheduler {
+    absl::Time at;
+    core::Event event;
+  };
+  struct ToWorker {
+    absl::Time at;
+    core::Message message;
+  };
+
+  bool Chance(double probability) { return random_.Uniform() < probability; }
+  absl::Duration Delay() { return absl::Milliseconds(1 + static_cast<std::int64_t>(random_.Below(50))); }
+
+  void SubmitJobs();
+  absl::Status Happen(core::Event event);
+  absl::Status Apply(core::Effects effects);
+  void Remember(const core::Record& record);
+  absl::Status Restart();
+  absl::Status Plan(const Memory::SubmittedJob& job);
+
+  absl::Status Deliver();
+  absl::Status Tick();
+  void MoveWorker(SimulatedWorker& worker);
+  void Connect(SimulatedWorker& worker);
+  void Break(core::ConnectionId connection);
+  void Receive(const core::Message& message);
+  void StartAttempt(SimulatedWorker& worker, const core::Lease& lease);
+  core::Finished Outcome(const SimulatedWorker& worker, const Attempt& attempt);
+  void Post(core::ConnectionId connection, core::Event event);
+  absl::Status ActAsUser();
+  bool IsOver() const;
+  absl::Status CheckEnd() const;
+  absl::Status Wrong(const std::string& what) const;
+
+  base::Random random_;
+  Weather weather_;
+  bool calm_ = false;  // after a while nothing goes wrong any more, so that everything must end
+  absl::Time now_ = absl::UnixEpoch();
+  absl::Time calm_at_;
+  std::int64_t steps_ = 0;
+  std::vector<plan::PlannedFrame> frames_;
+  std::set<std::int32_t> bad_frames_;
+  std::size_t frames_known_ = 0;
+  bool closed_ = false;
+
+  core::State state_;
+  bool scheduler_up_ = true;
+  Memory memory_;
+  std::set<base::Digest> files_;                   // results in the artifact folder
+  std::map<base::Digest, std::int32_t> accepted_;  // how often a result was taken for a key since its file was last lost
+  core::ConnectionId last_connection_ = 0;
+  std::int64_t last_worker_ = 0;
+  std::vector<SimulatedWorker> workers_;
+  std::map<core::ConnectionId, std::deque<ToScheduler>> to_scheduler_;
+  std::map<core::ConnectionId, std::deque<ToWorker>> to_worker_;
+  std::deque<ToScheduler> answers_;  // of look-ups
+};
+
+}  // namespace vorocast::scenario

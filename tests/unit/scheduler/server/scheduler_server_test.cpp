@@ -1,0 +1,317 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "scheduler/server/scheduler_server.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <map>
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include "absl/time/clock.h"
+#include "fake_worker.h"
+#include "proto/capture.grpc.pb.h"
+#include "proto/jobs.grpc.pb.h"
+#include "services/base/digest.h"
+#include "services/rpc/channel.h"
+#include "services/rpc/status.h"
+
+namespace vorocast::server {
+namespace {
+
+using testing::Contains;
+using testing::HasSubstr;
+
+class SchedulerServerTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    const auto* info = testing::UnitTest::GetInstance()->current_test_info();
+    state_ = std::filesystem::temp_directory_path() / fmt::format("vorocast_{}_{}", info->name(), getpid());
+    std::filesystem::remove_all(state_);
+    std::filesystem::create_directories(state_);
+    address_ = "unix:" + (state_ / "s.sock").string();
+    StartScheduler();
+    artifacts_.emplace(*storage::ArtifactStore::Open(state_));
+  }
+  void TearDown() override {
+    worker_.reset();
+    server_.reset();
+    std::filesystem::remove_all(state_);
+  }
+
+  void StartScheduler() {
+    auto server = SchedulerServer::Start({.state = state_, .listen = address_});
+    ASSERT_TRUE(server.ok()) << server.status();
+    server_ = *std::move(server);
+    captures_ = v1::Captures::NewStub(rpc::Connect(address_));
+    jobs_ = v1::Jobs::NewStub(rpc::Connect(address_));
+  }
+  void StartWorker(FakeWorker::Behaviour behaviour = {}) { worker_ = std::make_unique<FakeWorker>(address_, *artifacts_, std::move(behaviour)); }
+
+  template <typename Stub, typename Request, typename Reply>
+  absl::StatusOr<Reply> Call(Stub& stub, grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Reply*), const Request& request) {
+    grpc::ClientContext context;
+    context.set_wait_for_ready(true);
+    context.set_deadline(absl::ToChronoTime(absl::Now() + absl::Seconds(30)));
+    Reply reply;
+    RETURN_IF_ERROR(rpc::FromGrpc((stub.*method)(&context, request, &reply)));
+    return reply;
+  }
+
+  absl::StatusOr<v1::Sequence> Open(double frames_per_second = 25) {
+    v1::OpenSequenceRequest request;
+    request.set_session("monday");
+    request.set_name("take 1");
+    request.set_frames_per_second(frames_per_second);
+    request.set_metres_per_unit(0.01);
+    request.set_up("+y");
+    return Call<v1::Captures::StubInterface>(*captures_, &v1::Captures::StubInterface::Open, request);
+  }
+  absl::Status Upload(const v1::Blob& blob, const std::string& bytes) {
+    grpc::ClientContext context;
+    v1::UploadReply reply;
+    const auto stream = captures_->Upload(&context, &reply);
+    v1::UploadChunk chunk;
+    *chunk.mutable_blob() = blob;
+    stream->Write(chunk);
+    chunk.clear_blob();
+    chunk.set_data(bytes);
+    stream->Write(chunk);
+    stream->WritesDone();
+    return rpc::FromGrpc(stream->Finish());
+  }
+  static std::string Bytes(int frame) { return fmt::format("points of frame {}", frame); }
+  static v1::Blob BlobOf(int frame) {
+    v1::Blob blob;
+    blob.set_sha256(base::HashBytes(Bytes(frame)).Hex());
+    blob.set_extension(".ply");
+    blob.set_size(static_cast<std::int64_t>(Bytes(frame).size()));
+    return blob;
+  }
+  absl::StatusOr<v1::Sequence> AddFrames(const std::string& sequence, int first, int last) {
+    v1::AddFramesRequest request;
+    request.set_sequence_id(sequence);
+    for (int i = first; i < last; ++i) {
+      RETURN_IF_ERROR(Upload(BlobOf(i), Bytes(i)));
+      v1::Frame& frame = *request.add_frames();
+      frame.set_number(i);
+      *frame.mutable_blob() = BlobOf(i);
+    }
+    return Call<v1::Captures::StubInterface>(*captures_, &v1::Captures::StubInterface::Add, request);
+  }
+  absl::StatusOr<v1::Sequence> Close(const std::string& sequence) {
+    v1::CloseSequenceRequest request;
+    request.set_sequence_id(sequence);
+    return Call<v1::Captures::StubInterface>(*captures_, &v1::Captures::StubInterface::Close, request);
+  }
+  absl::StatusOr<v1::Job> Submit(
+      const std::string& sequence, const std::function<void(v1::SubmitJobRequest&)>& change = [](auto&) {}) {
+    v1::SubmitJobRequest request;
+    request.set_sequence_id(sequence);
+    request.set_cells(100);
+    request.set_iterations(3);
+    request.set_template_frame(-1);
+    request.set_window_frames(4);
+    request.set_interpolated_max(1);
+    request.set_sheets(true);
+    request.set_user("anna");
+    change(request);
+    return Call<v1::Jobs::StubInterface>(*jobs_, &v1::Jobs::StubInterface::Submit, request);
+  }
+  absl::StatusOr<v1::Job> Get(const std::string& job) {
+    v1::JobRequest request;
+    request.set_job_id(job);
+    return Call<v1::Jobs::StubInterface>(*jobs_, &v1::Jobs::StubInterface::Get, request);
+  }
+  /// The last message of a Watch.
+  absl::StatusOr<v1::Job> WatchToEnd(const std::string& id) {
+    grpc::ClientContext context;
+    context.set_deadline(absl::ToChronoTime(absl::Now() + absl::Seconds(30)));
+    v1::JobRequest request;
+    request.set_job_id(id);
+    const auto stream = jobs_->Watch(&context, request);
+    v1::Job job;
+    while (stream->Read(&job)) continue;
+    RETURN_IF_ERROR(rpc::FromGrpc(stream->Finish()));
+    return job;
+  }
+  std::string Explain(const std::string& job, const std::string& task) {
+    v1::ExplainRequest request;
+    request.set_job_id(job);
+    request.set_task(task);
+    const auto reply = Call<v1::Jobs::StubInterface>(*jobs_, &v1::Jobs::StubInterface::Explain, request);
+    return reply.ok() ? reply->text() : std::string(reply.status().message());
+  }
+  absl::StatusOr<std::string> Fetch(const std::string& job, const std::string& name) {
+    grpc::ClientContext context;
+    v1::FetchRequest request;
+    request.set_job_id(job);
+    request.set_name(name);
+    const auto stream = jobs_->Fetch(&context, request);
+    std::string bytes;
+    v1::FetchChunk chunk;
+    while (stream->Read(&chunk)) bytes += chunk.data();
+    RETURN_IF_ERROR(rpc::FromGrpc(stream->Finish()));
+    return bytes;
+  }
+  /// Polls until `holds` or half a minute has gone.
+  static bool Await(const std::function<bool()>& holds) {
+    const absl::Time deadline = absl::Now() + absl::Seconds(30);
+    while (absl::Now() < deadline) {
+      if (holds()) return true;
+      absl::SleepFor(absl::Milliseconds(5));
+    }
+    return false;
+  }
+
+  std::filesystem::path state_;
+  std::string address_;
+  std::unique_ptr<SchedulerServer> server_;
+  std::optional<storage::ArtifactStore> artifacts_;
+  std::unique_ptr<v1::Captures::StubInterface> captures_;
+  std::unique_ptr<v1::Jobs::StubInterface> jobs_;
+  std::unique_ptr<FakeWorker> worker_;
+};
+
+TEST_F(SchedulerServerTest, RunsAJobToItsEnd) {
+  const auto sequence = Open();
+  ASSERT_TRUE(sequence.ok()) << sequence.status();
+  const auto job = Submit(sequence->id());
+  ASSERT_TRUE(job.ok()) << job.status();
+  StartWorker();
+  ASSERT_TRUE(AddFrames(sequence->id(), 0, 5).ok());
+  // Work starts before the take has ended.
+  EXPECT_TRUE(Await([&] { return worker_->executed().contains("frame 4: tessellate"); }));
+  ASSERT_TRUE(AddFrames(sequence->id(), 3, 9).ok());
+  ASSERT_TRUE(Close(sequence->id()).ok());
+  const auto ended = WatchToEnd(job->id());
+  ASSERT_TRUE(ended.ok()) << ended.status();
+  EXPECT_EQ(ended->state(), v1::DONE) << ended->DebugString();
+  EXPECT_EQ(ended->sequence_name(), "take 1");
+  EXPECT_EQ(ended->outputs_size(), 9 + 2 + 3);
+  for (const auto& [label, times] : worker_->executed()) EXPECT_EQ(times, 1) << label;
+  EXPECT_EQ(*Fetch(job->id(), "tracked.h5"), "assemble");
+  EXPECT_EQ(Fetch(job->id(), "nothing.h5").status().code(), absl::StatusCode::kNotFound);
+  EXPECT_THAT(Explain(job->id(), "assemble"), HasSubstr("done"));
+
+  // The same again costs nothing.
+  const auto again = Submit(sequence->id());
+  const auto reused = WatchToEnd(again->id());
+  EXPECT_EQ(reused->state(), v1::DONE);
+  for (const v1::Stage& stage : reused->stages()) EXPECT_EQ(stage.reused(), stage.total()) << stage.kind();
+  for (const auto& [label, times] : worker_->executed()) EXPECT_EQ(times, 1) << label;
+}
+
+TEST_F(SchedulerServerTest, ABadFrameCostsThatFrame) {
+  StartWorker({.fails = [](const std::string& label) { return label == "frame 2: tessellate" ? "3 normals are not finite" : ""; }});
+  const auto sequence = Open();
+  const auto job = Submit(sequence->id());
+  ASSERT_TRUE(AddFrames(sequence->id(), 0, 6).ok());
+  ASSERT_TRUE(Close(sequence->id()).ok());
+  const auto ended = WatchToEnd(job->id());
+  ASSERT_TRUE(ended.ok());
+  EXPECT_EQ(ended->state(), v1::DONE);
+  ASSERT_EQ(ended->failures_size(), 1);
+  EXPECT_EQ(ended->failures(0).label(), "frame 2: tessellate");
+  EXPECT_THAT(ended->failures(0).cause(), HasSubstr("not finite"));
+  EXPECT_EQ(worker_->executed()["frame 2: tessellate"], 1);
+}
+
+TEST_F(SchedulerServerTest, TooManyBadFramesFailTheJobWithOneCause) {
+  StartWorker({.fails = [](const std::string& label) { return label.ends_with("tessellate") ? "empty file" : ""; }});
+  const auto sequence = Open();
+  const auto job = Submit(sequence->id());
+  ASSERT_TRUE(AddFrames(sequence->id(), 0, 6).ok());
+  ASSERT_TRUE(Close(sequence->id()).ok());
+  const auto ended = WatchToEnd(job->id());
+  ASSERT_TRUE(ended.ok());
+  EXPECT_EQ(ended->state(), v1::FAILED);
+  EXPECT_THAT(ended->failures(0).cause(), HasSubstr("at most"));
+  EXPECT_FALSE(worker_->executed().contains("assemble"));
+}
+
+TEST_F(SchedulerServerTest, GoesOnAfterARestart) {
+  StartWorker({.holds = [](const std::string& label) { return label == "frame 3: tessellate"; }});
+  const auto sequence = Open();
+  const auto job = Submit(sequence->id());
+  ASSERT_TRUE(AddFrames(sequence->id(), 0, 6).ok());
+  ASSERT_TRUE(Close(sequence->id()).ok());
+  ASSERT_TRUE(Await([&] { return Get(job->id())->stages(0).done() == 5; }));
+  server_.reset();
+  StartScheduler();
+  // The worker comes back, is told to go on with what it holds, and ends it.
+  ASSERT_TRUE(Await([&] { return worker_->went_on() >= 1; }));
+  EXPECT_EQ(Get(job->id())->state(), v1::RUNNING);
+  worker_->Release();
+  const auto ended = WatchToEnd(job->id());
+  ASSERT_TRUE(ended.ok()) << ended.status();
+  EXPECT_EQ(ended->state(), v1::DONE) << ended->DebugString();
+  for (const auto& [label, times] : worker_->executed()) EXPECT_EQ(times, 1) << label;
+}
+
+TEST_F(SchedulerServerTest, CancelAndRetry) {
+  StartWorker({.holds = [](const std::string& label) { return label == "template"; }});
+  const auto sequence = Open();
+  const auto job = Submit(sequence->id());
+  ASSERT_TRUE(AddFrames(sequence->id(), 0, 6).ok());
+  ASSERT_TRUE(Close(sequence->id()).ok());
+  ASSERT_TRUE(Await([&] { return Get(job->id())->stages(0).done() == 6; }));
+  v1::JobRequest request;
+  request.set_job_id(job->id());
+  EXPECT_EQ((Call<v1::Jobs::StubInterface>(*jobs_, &v1::Jobs::StubInterface::Cancel, request)->state()), v1::CANCELLED);
+  server_.reset();
+  StartScheduler();
+  EXPECT_TRUE(Await([&] { return Get(job->id())->state() == v1::CANCELLED; }));
+  EXPECT_EQ(Get(job->id())->stages(0).done(), 6);
+  worker_->Release();
+  EXPECT_EQ((Call<v1::Jobs::StubInterface>(*jobs_, &v1::Jobs::StubInterface::Retry, request)->state()), v1::RUNNING);
+  EXPECT_EQ(WatchToEnd(job->id())->state(), v1::DONE);
+  EXPECT_EQ(worker_->executed()["frame 0: tessellate"], 1);
+}
+
+TEST_F(SchedulerServerTest, RefusesWhatIsWrong) {
+  const auto sequence = Open();
+  EXPECT_EQ(Open()->id(), sequence->id());
+  EXPECT_EQ(Open(30).status().code(), absl::StatusCode::kAlreadyExists);
+  EXPECT_EQ(Open(0).status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(Submit("s99").status().code(), absl::StatusCode::kNotFound);
+  EXPECT_THAT(std::string(Submit(sequence->id(), [](auto& r) { r.set_cells(-5); }).status().message()), HasSubstr("cells"));
+  EXPECT_THAT(std::string(Submit(sequence->id(), [](auto& r) { r.set_indicator("magic"); }).status().message()), HasSubstr("spectral"));
+  EXPECT_THAT(std::string(Submit(sequence->id(), [](auto& r) { r.set_effect_json("{"); }).status().message()), HasSubstr("effect_json"));
+  EXPECT_EQ(Get("j99").status().code(), absl::StatusCode::kNotFound);
+
+  v1::Blob blob = BlobOf(1);
+  EXPECT_EQ(Upload(blob, "other bytes of it...").code(), absl::StatusCode::kDataLoss);
+  blob.set_extension("../../x");
+  EXPECT_EQ(Upload(blob, Bytes(1)).code(), absl::StatusCode::kInvalidArgument);
+  v1::AddFramesRequest add;
+  add.set_sequence_id(sequence->id());
+  add.add_frames()->set_number(0);
+  *add.mutable_frames(0)->mutable_blob() = BlobOf(0);
+  const auto not_there = Call<v1::Captures::StubInterface>(*captures_, &v1::Captures::StubInterface::Add, add);
+  EXPECT_EQ(not_there.status().code(), absl::StatusCode::kFailedPrecondition);
+  ASSERT_TRUE(AddFrames(sequence->id(), 0, 2).ok());
+  *add.mutable_frames(0)->mutable_blob() = BlobOf(1);
+  const auto other = Call<v1::Captures::StubInterface>(*captures_, &v1::Captures::StubInterface::Add, add);
+  EXPECT_EQ(other.status().code(), absl::StatusCode::kAlreadyExists);
+}
+
+TEST_F(SchedulerServerTest, ASecondSchedulerOnTheFolderIsRefused) {
+  const auto second = SchedulerServer::Start({.state = state_, .listen = "127.0.0.1:0"});
+  EXPECT_EQ(second.status().code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_THAT(std::string(second.status().message()), HasSubstr(std::to_string(getpid())));
+}
+
+TEST_F(SchedulerServerTest, ATakeClosedEmptyFailsItsJob) {
+  const auto sequence = Open();
+  const auto job = Submit(sequence->id());
+  ASSERT_TRUE(Close(sequence->id()).ok());
+  const auto ended = WatchToEnd(job->id());
+  EXPECT_EQ(ended->state(), v1::FAILED);
+  EXPECT_THAT(ended->failures(0).cause(), HasSubstr("without a frame"));
+}
+
+}  // namespace
+}  // namespace vorocast::server
