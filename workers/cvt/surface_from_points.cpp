@@ -62,7 +62,7 @@ absl::Status CheckPoints(const geometry::OrientedPoints& points) {
   return absl::OkStatus();
 }
 
-/// Refuses points on a plane, a line or at one place, and points whose normals all face much the same way: neither bounds a volume.
+/// Refuses points on a plane, a line or at one place.
 absl::Status CheckSolid(const geometry::OrientedPoints& points) {
   Vec3 mean = Vec3::Zero();
   for (const Vec3& x : points.positions) mean += x / static_cast<double>(points.size());
@@ -76,6 +76,7 @@ absl::Status CheckSolid(const geometry::OrientedPoints& points) {
   return absl::OkStatus();
 }
 
+/// Refuses points whose normals mostly face one way: they lie on a sheet, not around a solid.
 absl::Status CheckSurrounding(const SortedPoints& points) {
   geometry::Vec3f flux = geometry::Vec3f::Zero();
   float area = 0;
