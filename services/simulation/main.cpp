@@ -1,2 +1,116 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
-int main() { return 1; }
+// vorocast-simulation: runs effects on tracked takes, as the last stage of the scheduler's jobs and through a gRPC door of its own.
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <future>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include "services/lease/drain_signals.h"
+#include "services/lease/lease_loop.h"
+#include "services/rpc/server.h"
+#include "services/simulation/simulate_executor.h"
+#include "services/simulation/simulation_service.h"
+
+namespace {
+
+using namespace vorocast;
+
+#ifdef __AVX2__
+/// Says so in words, before the first instruction that an older processor does not know: the program is built for x86-64-v3.
+[[gnu::constructor(101), gnu::target("arch=x86-64")]] void RequireInstructionSet() {
+  __builtin_cpu_init();
+  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("bmi2")) return;
+  static constexpr char kMessage[] =
+      "vorocast-simulation: this processor lacks AVX2, FMA or BMI2; use another machine, or build with -DVOROCAST_MARCH=x86-64\n";
+  [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, kMessage, sizeof(kMessage) - 1);
+  ::_exit(EXIT_FAILURE);
+}
+#endif
+
+constexpr char kStory[] =
+    "Runs effects on tracked takes with rigid-body physics. With --scheduler it takes simulation tasks from a Vorocast scheduler;\n"
+    "with --listen it answers its own gRPC service: which effects there are, whether an effect is right, and a run on any tracked\n"
+    "take in the artifact folder given by --store. Both at once are fine. SIGTERM or Ctrl-C lets it finish what runs and leave.";
+
+struct Options {
+  lease::LeaseLoopOptions lease;
+  std::string listen;
+  std::string store;
+};
+
+/// Until SIGTERM or SIGINT.
+void WaitForSignal() {
+  std::promise<void> told;
+  std::future<void> signalled = told.get_future();
+  bool first = true;
+  const lease::DrainSignals signals([&] {
+    if (std::exchange(first, false)) told.set_value();
+  });
+  signalled.wait();
+}
+
+absl::Status Serve(const Options& options) {
+  std::unique_ptr<simulation::SimulationService> service;
+  std::unique_ptr<rpc::Server> server;
+  if (!options.listen.empty()) {
+    ASSIGN_OR_RETURN(storage::ArtifactStore store, storage::ArtifactStore::Open(options.store));
+    service = std::make_unique<simulation::SimulationService>(
+        simulation::SimulationService::Options{.store = std::move(store), .program = options.lease.program, .runs_max = options.lease.slots});
+    ASSIGN_OR_RETURN(server, rpc::StartServer({.listen = options.listen, .services = {service.get()}}));
+    fmt::print("{}\n", server->address());
+    std::fflush(stdout);
+  }
+  absl::Status status = absl::OkStatus();
+  if (options.lease.scheduler.empty()) {
+    WaitForSignal();
+  } else {
+    status = lease::RunLeaseLoop(options.lease, {tasks::Kind::kSimulate});
+  }
+  if (server) server->Stop(options.lease.drain_time);
+  return status;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app(kStory, "vorocast-simulation");
+  Options options;
+  double drain_seconds = absl::ToDoubleSeconds(options.lease.drain_time);
+  app.add_option("--scheduler", options.lease.scheduler, "Takes tasks from here: HOST:PORT or unix:/PATH")->envname("VOROCAST_SCHEDULER");
+  CLI::Option* listen =
+      app.add_option("--listen", options.listen, "Answers gRPC here: HOST:PORT, port 0 for any free one, or unix:/PATH. The address is printed");
+  CLI::Option* store = app.add_option("--store", options.store, "The artifact folder for runs asked for over --listen");
+  listen->needs(store);
+  app.add_option("--slots", options.lease.slots, "Simulations at once, from each side")->check(CLI::Range(1, 10000))->capture_default_str();
+  app.add_option("--name", options.lease.name, "Name among the workers; host, process number and start time if not given");
+  app.add_option("--drain-time", drain_seconds, "Seconds that running simulations get after SIGTERM before they are given back")
+      ->check(CLI::Range(0.0, 86400.0))
+      ->capture_default_str();
+  CLI::App* execute_task = app.add_subcommand("execute-task", "Runs one task given on standard input; the program starts this itself");
+  CLI11_PARSE(app, argc, argv);
+
+  if (execute_task->parsed()) {
+    std::vector<std::unique_ptr<lease::Executor>> executors;
+    executors.push_back(std::make_unique<simulation::SimulateExecutor>());
+    return lease::ExecuteTaskMain(executors);
+  }
+  if (options.lease.scheduler.empty() && options.listen.empty()) {
+    fmt::print(stderr, "vorocast-simulation: nothing to do; give --scheduler, --listen, or both\n");
+    return EXIT_FAILURE;
+  }
+  std::error_code error;
+  options.lease.program = std::filesystem::read_symlink("/proc/self/exe", error);
+  options.lease.drain_time = absl::Seconds(drain_seconds);
+  const absl::Status status = Serve(options);
+  if (status.ok()) return EXIT_SUCCESS;
+  fmt::print(stderr, "vorocast-simulation: {}\n", std::string(status.message()));
+  return EXIT_FAILURE;
+}

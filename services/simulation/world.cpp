@@ -16,7 +16,7 @@ using geometry::Rigid3;
 using geometry::Vec3;
 
 constexpr double kUnits = 100;  // Bullet units (centimetres) a metre
-constexpr int kSolverIterations = 5;
+constexpr int kSolverIterations = 8;
 constexpr float kAngularDamping = 0.2F;  // of released cells, so that a pile comes to rest
 constexpr float kSleepSpeed = 4;         // centimetres a second
 constexpr float kSleepTurn = 1;          // radians a second
