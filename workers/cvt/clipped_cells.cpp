@@ -166,8 +166,8 @@ bool ClippedCells::AddTriangle(std::int32_t triangle) {
   for (std::size_t q = 0; q < queue_.size(); ++q) {
     if (!AddPiece(triangle, queue_[q])) return false;
     const auto names = diagram_.names(diagram_.cell(queue_[q]));
-    for (const SurfacePiece::Corner& corner : piece_.corners) {
-      if (corner.edge >= 0) enqueue(names[corner.edge]);
+    for (std::size_t k = 0; k < piece_.size; ++k) {
+      if (piece_.corners[k].edge >= 0) enqueue(names[piece_.corners[k].edge]);
     }
   }
   return true;
@@ -178,31 +178,33 @@ bool ClippedCells::AddPiece(std::int32_t triangle, std::int32_t site) {
   for (;;) {
     if (!clipper_.Clip(triangle, site, &piece_)) return false;
     double furthest = 0;
-    for (const SurfacePiece::Corner& corner : piece_.corners) furthest = std::max(furthest, SquaredDistance(corner.position, sites_[site]));
+    if (positions_.size() < piece_.size) positions_.resize(2 * piece_.size);
+    for (std::size_t c = 0; c < piece_.size; ++c) {
+      positions_[c] = clipper_.Position(piece_.corners[c]) - sites_[site];
+      furthest = std::max(furthest, positions_[c].squaredNorm());
+    }
     const double reach = diagram_.cell(site).reach;
     if (furthest <= reach * reach) break;
     if (!diagram_.Enlarge(site, std::max(kReachGrowth * reach, 1.05 * std::sqrt(furthest)))) return false;
   }
   const auto& corners = piece_.corners;
-  if (corners.empty()) return true;
+  const std::size_t n = piece_.size;
+  if (n == 0) return true;
   boundary_[site] = 1;
   const VoronoiDiagram::Cell& cell = diagram_.cell(site);
   const auto planes = diagram_.planes(cell);
   const auto names = diagram_.names(cell);
   Moments& sum = moments_[site];
-  const std::size_t n = corners.size();
-  const Vec3 fan = corners[0].position - sites_[site];
-  for (std::size_t c = 0; c < n; ++c) {
-    const SurfacePiece::Corner& corner = corners[c];
-    const Vec3 here = corner.position - sites_[site];
-    const Vec3 there = corners[(c + 1) % n].position - sites_[site];
-    if (c > 0 && c + 1 < n) sum.AddCone(fan, here, there);
-    if (corner.edge < 0) continue;
+  for (std::size_t i = 0; i < n; ++i) {
+    const Vec3& here = positions_[i];
+    const Vec3& there = positions_[i + 1 == n ? 0 : i + 1];
+    if (i > 0 && i + 1 < n) sum.AddCone(positions_[0], here, there);
+    const std::int32_t edge = corners[i].edge;
+    if (edge < 0) continue;
     // The same edge bounds, the other way round, the part of the cell's face that lies in the solid.
-    const HalfSpace& plane = planes[corner.edge];
-    sum.AddFaceEdge(plane.p, plane.square, there, here, 1);
-    const std::int32_t edge_before = corners[(c + n - 1) % n].edge;
-    if (edge_before >= 0) crossings_.push_back({site, names[edge_before], names[corner.edge], triangle, here});
+    sum.AddFaceEdge(planes[edge].p, planes[edge].square, there, here, 1);
+    const std::int32_t edge_before = corners[i == 0 ? n - 1 : i - 1].edge;
+    if (edge_before >= 0) crossings_.push_back({site, names[edge_before], names[edge], triangle, here});
   }
   if (complex_) KeepPiece(triangle, site);
   return true;
@@ -210,9 +212,10 @@ bool ClippedCells::AddPiece(std::int32_t triangle, std::int32_t site) {
 
 void ClippedCells::KeepPiece(std::int32_t triangle, std::int32_t site) {
   const auto names = diagram_.names(diagram_.cell(site));
-  complex_->pieces.push_back({site, triangle, static_cast<std::int64_t>(complex_->corners.size()), static_cast<std::int32_t>(piece_.corners.size())});
-  for (const SurfacePiece::Corner& corner : piece_.corners) {
-    complex_->corners.push_back({corner.key, corner.position, corner.edge >= 0 ? names[corner.edge] : -1});
+  complex_->pieces.push_back({site, triangle, static_cast<std::int64_t>(complex_->corners.size()), static_cast<std::int32_t>(piece_.size)});
+  for (std::size_t k = 0; k < piece_.size; ++k) {
+    const SurfacePiece::Corner& corner = piece_.corners[k];
+    complex_->corners.push_back({clipper_.Key(corner), clipper_.Position(corner), corner.edge >= 0 ? names[corner.edge] : -1});
   }
 }
 
@@ -359,10 +362,9 @@ bool ClippedCells::FindWinding(std::int32_t site) {
     }
   }
   std::int32_t first = -lowest;
+  by_rays_ = by_rays_ || highest - lowest > 1;  // the surface crosses itself
   if (by_rays_) {
     first = WindingAt(sites_[site] + corners[0].position);
-  } else if (highest - lowest > 1) {
-    return false;
   } else if (highest == lowest) {
     const Moments before = moments_[site];
     AddFaceEdges(site);

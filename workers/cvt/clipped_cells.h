@@ -105,6 +105,7 @@ class ClippedCells {
   std::vector<std::int32_t> queued_in_;  // [n] the triangle whose queue last held the site
   std::vector<std::int32_t> queue_;
   SurfacePiece piece_;
+  std::vector<geometry::Vec3> positions_;   // of its corners, from the site
   std::vector<std::int32_t> cell_winding_;  // [n] of cells that the surface does not touch
   struct Exit {                             // one crossing of the edge that leaves a corner by a slot: +1 leaves the solid, −1 enters it
     std::int32_t corner, slot, sign;

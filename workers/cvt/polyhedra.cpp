@@ -65,12 +65,13 @@ class Assembler {
         complex_(complex),
         cells_(*cells),
         first_cell_(static_cast<std::int32_t>(cells->size())),
-        table_(complex.corners.size() + 8 * complex.sites.size(), &cells->vertices) {}
+        table_(complex.corners.size() / 4 + 7 * complex.sites.size(), &cells->vertices) {}
 
   absl::Status Run() {
     if (cells_.face_offset.empty()) cells_.face_offset.push_back(0);
     if (cells_.vertex_offset.empty()) cells_.vertex_offset.push_back(0);
     SortPieces();
+    cells_.vertices.reserve(cells_.vertices.size() + complex_.corners.size() / 3 + 7 * complex_.sites.size());
     for (std::int32_t i = 0; i < static_cast<std::int32_t>(complex_.sites.size()); ++i) {
       if (!AppendCell(i)) return absl::InternalError(fmt::format("the outlines of cell {}'s faces do not close", first_cell_ + i));
     }

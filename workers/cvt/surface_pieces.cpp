@@ -27,15 +27,17 @@ bool TriangleClipper::Clip(std::int32_t triangle, std::int32_t site, SurfacePiec
   const VoronoiDiagram::Cell& cell = diagram_.cell(site);
   const auto planes = diagram_.planes(cell);
   const auto names = diagram_.names(cell);
-  piece->corners.clear();
+  if (piece->corners.size() < planes.size() + 4) piece->corners.resize(planes.size() + 4);
+  if (swap_.size() < piece->corners.size()) swap_.resize(piece->corners.size());
+  piece->size = 3;
   std::array<Vec3, 3> seen;  // from the site
   for (int m = 0; m < 3; ++m) {
     const Vec3& position = solid_.vertices[vertex_[m]];
     seen[m] = position - sites_[site];
     own_distance_[m] = SquaredDistance(position, sites_[site]);
-    Corner corner{{0, 0, 0}, position, {VertexKey::kMeshVertex, {vertex_[m], -1, -1, -1}}, site, own_distance_[m], -1 - m};
+    Corner& corner = piece->corners[m];
+    corner = {{0, 0, 0}, own_distance_[m], site, -1 - m, SurfacePiece::kVertex + m, {-1, -1}};
     corner.weight[m] = 1;
-    piece->corners.push_back(corner);
   }
   if (bisectors_.size() < planes.size()) bisectors_.resize(planes.size());
   const double furthest = std::max({own_distance_[0], own_distance_[1], own_distance_[2]});
@@ -47,15 +49,16 @@ bool TriangleClipper::Clip(std::int32_t triangle, std::int32_t site, SurfacePiec
     bisectors_[p].name = names[p];
     for (int m = 0; m < 3; ++m) bisectors_[p].distance[m] = SquaredDistance(solid_.vertices[vertex_[m]], sites_[names[p]]);
     if (!CutBy(p, bisectors_[p], piece)) return false;
-    if (piece->corners.empty()) return true;
+    if (piece->size == 0) return true;
   }
   return true;
 }
 
 bool TriangleClipper::CutBy(std::int32_t plane, const Bisector& bisector, SurfacePiece* piece) {
-  std::vector<Corner>& corners = piece->corners;
-  const std::size_t n = corners.size();
-  kept_.resize(n);
+  // Every cut adds at most one corner, so the capacity made in Clip suffices.
+  const Corner* corners = piece->corners.data();
+  const std::size_t n = piece->size;
+  if (kept_.size() < n) kept_.resize(2 * n);
   std::size_t kept_count = 0;
   for (std::size_t c = 0; c < n; ++c) {
     const double distance = Interpolate(corners[c].weight, bisector.distance);
@@ -64,29 +67,28 @@ bool TriangleClipper::CutBy(std::int32_t plane, const Bisector& bisector, Surfac
   }
   if (kept_count == n) return true;
   if (kept_count == 0) {
-    corners.clear();
+    piece->size = 0;
     return true;
   }
   // The corners beyond the bisector are one run of a convex polygon: first … last, both cyclic.
   std::size_t first = n;
   std::size_t runs = 0;
   for (std::size_t c = 0; c < n; ++c) {
-    if (!kept_[c] && kept_[(c + n - 1) % n]) first = c, ++runs;
+    if (!kept_[c] && kept_[c == 0 ? n - 1 : c - 1]) first = c, ++runs;
   }
   if (runs != 1) return false;
   const std::size_t removed = n - kept_count;
   const std::size_t before = (first + n - 1) % n;
   const std::size_t last = (first + removed - 1) % n;
   const std::size_t after = (last + 1) % n;
-  Corner enter = Crossing(corners[before].edge, bisector);
-  enter.edge = plane;
-  Corner leave = Crossing(corners[last].edge, bisector);
-  leave.edge = corners[last].edge;
-  swap_.clear();
-  for (std::size_t c = after, k = 0; k < kept_count; c = (c + 1) % n, ++k) swap_.push_back(corners[c]);
-  swap_.push_back(enter);
-  swap_.push_back(leave);
-  std::swap(corners, swap_);
+  Corner* to = swap_.data();
+  for (std::size_t c = after, k = 0; k < kept_count; c = c + 1 == n ? 0 : c + 1, ++k) *to++ = corners[c];
+  *to = Crossing(corners[before].edge, bisector);
+  to++->edge = plane;
+  *to = Crossing(corners[last].edge, bisector);
+  to->edge = corners[last].edge;
+  std::swap(piece->corners, swap_);
+  piece->size = kept_count + 2;
   return true;
 }
 
@@ -110,11 +112,10 @@ Corner TriangleClipper::CrossSide(int side, const Bisector& bisector) const {
   corner.weight = {0, 0, 0};
   corner.weight[u] = 1 - t;
   corner.weight[v] = t;
-  const Vec3& from = solid_.vertices[vertex_[u]];
-  corner.position = from + t * (solid_.vertices[vertex_[v]] - from);
   corner.judge = std::min(site_, bisector.name);
   corner.judge_distance = Interpolate(corner.weight, low);
-  corner.key = {VertexKey::kMeshEdge, {vertex_[u], vertex_[v], corner.judge, std::max(site_, bisector.name)}};
+  corner.place = SurfacePiece::kSide + side;
+  corner.other = {bisector.name, -1};
   return corner;
 }
 
@@ -134,12 +135,36 @@ Corner TriangleClipper::CrossPlane(const Bisector& first, const Bisector& second
   weight = sum != 0 ? Vec3(weight / sum) : Vec3::Constant(1.0 / 3);
   Corner corner;
   corner.weight = {weight[0], weight[1], weight[2]};
-  const Vec3& origin = solid_.vertices[vertex_[0]];
-  corner.position = origin + weight[1] * (solid_.vertices[vertex_[1]] - origin) + weight[2] * (solid_.vertices[vertex_[2]] - origin);
   corner.judge = site[0].first;
   corner.judge_distance = Interpolate(corner.weight, *site[0].second);
-  corner.key = {VertexKey::kTriangle, {triangle_, site[0].first, site[1].first, site[2].first}};
+  corner.place = SurfacePiece::kWithin;
+  corner.other = {first.name, second.name};
   return corner;
+}
+
+Vec3 TriangleClipper::Position(const Corner& corner) const {
+  if (corner.place < SurfacePiece::kSide) return solid_.vertices[vertex_[corner.place]];
+  if (corner.place < SurfacePiece::kWithin) {
+    int u = corner.place - SurfacePiece::kSide;
+    int v = (u + 1) % 3;
+    if (vertex_[u] > vertex_[v]) std::swap(u, v);
+    const Vec3& from = solid_.vertices[vertex_[u]];
+    return from + corner.weight[v] * (solid_.vertices[vertex_[v]] - from);
+  }
+  const Vec3& origin = solid_.vertices[vertex_[0]];
+  return origin + corner.weight[1] * (solid_.vertices[vertex_[1]] - origin) + corner.weight[2] * (solid_.vertices[vertex_[2]] - origin);
+}
+
+VertexKey TriangleClipper::Key(const Corner& corner) const {
+  if (corner.place < SurfacePiece::kSide) return {VertexKey::kMeshVertex, {vertex_[corner.place], -1, -1, -1}};
+  if (corner.place < SurfacePiece::kWithin) {
+    const auto [u, v] = std::minmax({vertex_[corner.place - SurfacePiece::kSide], vertex_[(corner.place - SurfacePiece::kSide + 1) % 3]});
+    const auto [i, j] = std::minmax({site_, corner.other[0]});
+    return {VertexKey::kMeshEdge, {u, v, i, j}};
+  }
+  std::array<std::int32_t, 3> sites{site_, corner.other[0], corner.other[1]};
+  std::ranges::sort(sites);
+  return {VertexKey::kTriangle, {triangle_, sites[0], sites[1], sites[2]}};
 }
 
 }  // namespace vorocast::cvt

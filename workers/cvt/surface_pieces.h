@@ -26,15 +26,17 @@ struct VertexKey {
 
 /// The part of one triangle that is nearest to one site: a convex polygon, counter-clockwise as the triangle.
 struct SurfacePiece {
+  enum Place : std::int32_t { kVertex = 0, kSide = 3, kWithin = 6 };
   struct Corner {
-    std::array<double, 3> weight;  // barycentric in the triangle
-    geometry::Vec3 position;
-    VertexKey key;
-    std::int32_t judge;     // lowest of the sites that meet here; it stands for all of them in comparisons
-    double judge_distance;  // the judge's squared distance, interpolated linearly over the triangle
-    std::int32_t edge;      // where the edge to the next corner lies: a plane of the cell, or −1−m on side m of the triangle
+    std::array<double, 3> weight;       // barycentric in the triangle
+    double judge_distance;              // the judge's squared distance, interpolated linearly over the triangle
+    std::int32_t judge;                 // lowest of the sites that meet here; it stands for all of them in comparisons
+    std::int32_t edge;                  // where the edge to the next corner lies: a plane of the cell, or −1−m on side m of the triangle
+    std::int32_t place;                 // kVertex + vertex, kSide + side (from vertex m to m+1), or kWithin
+    std::array<std::int32_t, 2> other;  // the sites that meet here besides the piece's own
   };
-  std::vector<Corner> corners;
+  std::vector<Corner> corners;  // [capacity]
+  std::size_t size = 0;
 };
 
 /// Cuts triangles by Voronoi cells. Every decision compares squared distances of mesh vertices to sites, interpolated over the triangle,
@@ -46,6 +48,10 @@ class TriangleClipper {
 
   /// The part of triangle `triangle` in the cell of `site`; no corner when they do not meet. False on a numerical contradiction.
   bool Clip(std::int32_t triangle, std::int32_t site, SurfacePiece* piece);
+
+  /// Of a corner of the last piece.
+  geometry::Vec3 Position(const SurfacePiece::Corner& corner) const;
+  VertexKey Key(const SurfacePiece::Corner& corner) const;
 
  private:
   struct Bisector {

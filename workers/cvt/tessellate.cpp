@@ -106,7 +106,12 @@ absl::StatusOr<OptimiseSummary> TessellateSolid(const Solid& solid, std::int32_t
   const std::size_t first = cells->size();
   RETURN_IF_ERROR(AppendPolyhedra(clipped, complex, cells));
   const TriangleTree tree(solid.vertices, solid.triangles);
-  for (std::size_t i = first; i < cells->size(); ++i) cells->depth.push_back(tree.Distance(cells->centroid[i]));
+  // No point is deeper than its neighbour in the list by more than the way between them.
+  double bound = std::numeric_limits<double>::infinity();
+  for (std::size_t i = first; i < cells->size(); ++i) {
+    if (i > first) bound = 1.000001 * (cells->depth.back() + (cells->centroid[i] - cells->centroid[i - 1]).norm());
+    cells->depth.push_back(tree.Distance(cells->centroid[i], bound));
+  }
   cells->component.resize(cells->size(), component);
   return summary;
 }

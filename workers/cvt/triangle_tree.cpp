@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
 
 namespace vorocast::cvt {
@@ -76,7 +75,7 @@ double TriangleTree::SquaredDistanceTo(std::int32_t triangle, const Vec3& point)
   return (point - NearestOnTriangle(point, vertices_[t[0]], vertices_[t[1]], vertices_[t[2]])).squaredNorm();
 }
 
-double TriangleTree::Distance(const Vec3& point) const {
+double TriangleTree::Distance(const Vec3& point, double at_most) const {
   struct Entry {
     std::int32_t node;
     double squared;
@@ -84,7 +83,7 @@ double TriangleTree::Distance(const Vec3& point) const {
   std::array<Entry, 96> stack;  // the tree is balanced: its depth is at most 32
   std::size_t size = 0;
   stack[size++] = {0, nodes_[0].box.squaredExteriorDistance(point)};
-  double best = std::numeric_limits<double>::infinity();
+  double best = at_most * at_most;
   while (size > 0) {
     const Entry entry = stack[--size];
     if (entry.squared >= best) continue;

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "services/geometry/vector.h"
@@ -18,8 +19,8 @@ class TriangleTree {
   /// Keeps references: both must outlive the tree. There must be at least one triangle.
   TriangleTree(const std::vector<geometry::Vec3>& vertices, const std::vector<std::array<std::int32_t, 3>>& triangles);
 
-  /// From the point to the surface, metres, never negative.
-  double Distance(const geometry::Vec3& point) const;
+  /// From the point to the surface, metres, never negative. A distance known not to be exceeded saves most of the search.
+  double Distance(const geometry::Vec3& point, double at_most = std::numeric_limits<double>::infinity()) const;
 
  private:
   struct Node {

@@ -131,7 +131,9 @@ TEST_P(OnShapes, MomentsAgreeWithRandomPoints) {
     const double share = m.volume[i] / total;
     EXPECT_NEAR(count[i] / kPoints, share, 5 * std::sqrt(share / kPoints) + 1e-4) << i;
     const double radius = std::sqrt(m.second_moment[i] / m.volume[i]);
-    if (count[i] > 30) EXPECT_LT((sum[i] / count[i] - m.centroid[i]).norm(), 5 * radius / std::sqrt(count[i])) << i;
+    if (count[i] > 30) {
+      EXPECT_LT((sum[i] / count[i] - m.centroid[i]).norm(), 5 * radius / std::sqrt(count[i])) << i;
+    }
   }
   EXPECT_NEAR(m.energy, energy, 0.04 * energy);
 }
