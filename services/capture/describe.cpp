@@ -13,13 +13,16 @@ namespace vorocast::capture {
 namespace {
 
 /// Heights of a standing or crouching person; outside of it the unit is doubtful.
-constexpr double kPersonHeightMin_m = 0.8;
-constexpr double kPersonHeightMax_m = 3;
+constexpr double kPersonMinMetres = 0.8;
+constexpr double kPersonMaxMetres = 3;
 
 /// 73091 -> "73,091".
 std::string Grouped(std::int64_t value) {
   return value < 1000 ? fmt::format("{}", value) : fmt::format("{},{:03}", Grouped(value / 1000), value % 1000);
 }
+
+/// "1 frame", "21 frames".
+std::string Frames(std::size_t count) { return fmt::format("{} frame{}", count, count == 1 ? "" : "s"); }
 
 /// The least and the greatest of what has been added.
 struct Range {
@@ -108,7 +111,7 @@ std::string FrameNumbers(const Inspection& inspection, const std::vector<std::si
   }
   if (members.size() == 1) return "frame " + text;
   if (runs == 1) return "frames " + text;
-  return fmt::format("frames {}{} ({} frames)", text, runs > kRunsMax ? ", …" : "", members.size());
+  return fmt::format("frames {}{} ({})", text, runs > kRunsMax ? ", …" : "", Frames(members.size()));
 }
 
 std::string DescribeGroup(const Inspection& inspection, const Group& group) {
@@ -163,15 +166,15 @@ std::string DescribeHints(const Inspection& inspection) {
     std::ranges::nth_element(heights, heights.begin() + static_cast<std::ptrdiff_t>(heights.size() / 2));
     const double median = heights[heights.size() / 2];
     const std::string unit = UnitOfPerson(median / inspection.capture.metres_per_unit);
-    if (median < kPersonHeightMin_m || median > kPersonHeightMax_m) {
+    if (median < kPersonMinMetres || median > kPersonMaxMetres) {
       text += fmt::format("  a person would be {:.2f} m tall here: {}\n", median,
                           unit.empty() ? "check --units and --up" : fmt::format("did you mean --units {}?", unit));
     }
   }
-  if (estimated > 0) text += fmt::format("  {} frames have no normals; estimating them takes about a second a frame\n", estimated);
+  if (estimated > 0) text += fmt::format("  {} without normals; estimating them takes about a second a frame\n", Frames(estimated));
   if (dropped > 0) text += fmt::format("  {} points are left out: not finite, or with a zero normal\n", Grouped(dropped));
   for (const auto& [parts, frames] : unexpected) {
-    text += fmt::format("  {} frames have {} parts where {} are expected\n", frames, parts, inspection.capture.components);
+    text += fmt::format("  {} of {} parts where {} are expected\n", Frames(frames), parts, inspection.capture.components);
   }
   return text;
 }
@@ -185,7 +188,7 @@ std::string Describe(const Inspection& inspection) {
     if (facts.status.ok()) heights.Add(Height(facts));
   }
   const auto count = static_cast<double>(inspection.frames.size());
-  std::string text = fmt::format("{}: {} frames, {:g} frames/s ({:.1f} s), unit {}, {} up", capture.name, inspection.frames.size(),
+  std::string text = fmt::format("{}: {}, {:g} frames/s ({:.1f} s), unit {}, {} up", capture.name, Frames(inspection.frames.size()),
                                  capture.frames_per_second, count / capture.frames_per_second, UnitOf(capture.metres_per_unit), capture.up);
   if (heights.high >= 0) text += fmt::format(", {} tall", heights.Metres());
   text += "\n";

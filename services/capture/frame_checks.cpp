@@ -14,10 +14,10 @@ namespace {
 
 using geometry::Vec3;
 
-constexpr double kDroppedMax = 0.01;      // of a frame's points
-constexpr double kCoordinateMax_m = 1e6;  // beyond it a number is damage, not a place
-constexpr double kExtentMax_m = 50;
-constexpr double kExtentMin_m = 0.01;
+constexpr double kDroppedMax = 0.01;          // of a frame's points
+constexpr double kCoordinateMaxMetres = 1e6;  // beyond it a number is damage, not a place
+constexpr double kExtentMaxMetres = 50;
+constexpr double kExtentMinMetres = 0.01;
 /// An open scan of one side has an outwardness near 0, a person's whole surface 0.2 to 0.3, the same turned inward −0.2 to −0.3.
 constexpr double kInward = -0.05;
 
@@ -53,7 +53,7 @@ std::string Length(double metres) { return metres < 0.1 ? fmt::format("{:.3g} m"
 
 absl::StatusOr<std::vector<bool>> CheckPositions(const std::vector<Vec3>& positions) {
   return Mark(positions, "positions are not finite", "the file is damaged or its export went wrong; export the frame again",
-              [](const Vec3& p) { return p.allFinite() && p.cwiseAbs().maxCoeff() <= kCoordinateMax_m; });
+              [](const Vec3& p) { return p.allFinite() && p.cwiseAbs().maxCoeff() <= kCoordinateMaxMetres; });
 }
 
 absl::StatusOr<std::vector<bool>> CheckNormals(const std::vector<Vec3>& normals) {
@@ -65,9 +65,9 @@ absl::Status CheckSize(const std::vector<Vec3>& positions, double metres_per_uni
   geometry::Box3 box;
   for (const Vec3& p : positions) box.extend(p);
   const double largest = box.sizes().maxCoeff();
-  if (largest >= kExtentMin_m && largest <= kExtentMax_m) return absl::OkStatus();
+  if (largest >= kExtentMinMetres && largest <= kExtentMaxMetres) return absl::OkStatus();
   const double core = CoreExtent(positions).maxCoeff();
-  if (largest > kExtentMax_m && core <= kExtentMax_m / 10) {
+  if (largest > kExtentMaxMetres && core <= kExtentMaxMetres / 10) {
     return absl::InvalidArgumentError(
         fmt::format("the frame is {} across, although 99 % of its points lie within {}: remove the stray points", Length(largest), Length(core)));
   }

@@ -17,7 +17,6 @@
 namespace vorocast::capture {
 namespace {
 
-using geometry::TriangleMesh;
 using geometry::Vec3;
 
 constexpr std::array<std::string_view, 4> kExtensions = {".ply", ".obj", ".off", ".drc"};

@@ -2,7 +2,6 @@
 #include "services/capture/natural_order.h"
 
 #include <algorithm>
-#include <compare>
 
 namespace vorocast::capture {
 namespace {
@@ -18,10 +17,8 @@ std::string_view TakeDigits(std::string_view& text) {
   return digits;
 }
 
-std::strong_ordering CompareNumbers(std::string_view a, std::string_view b) {
-  if (a.size() != b.size()) return a.size() <=> b.size();
-  return a <=> b;
-}
+/// Numbers without leading zeros, of any length.
+bool NumberLess(std::string_view a, std::string_view b) { return a.size() != b.size() ? a.size() < b.size() : a < b; }
 
 }  // namespace
 
@@ -30,8 +27,9 @@ bool NaturalLess(std::string_view a, std::string_view b) {
   std::string_view rest_b = b;
   while (!rest_a.empty() && !rest_b.empty()) {
     if (IsDigit(rest_a[0]) && IsDigit(rest_b[0])) {
-      const std::strong_ordering order = CompareNumbers(TakeDigits(rest_a), TakeDigits(rest_b));
-      if (order != 0) return order < 0;
+      const std::string_view number_a = TakeDigits(rest_a);
+      const std::string_view number_b = TakeDigits(rest_b);
+      if (number_a != number_b) return NumberLess(number_a, number_b);
       continue;
     }
     if (rest_a[0] != rest_b[0]) return static_cast<unsigned char>(rest_a[0]) < static_cast<unsigned char>(rest_b[0]);

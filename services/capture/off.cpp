@@ -63,7 +63,7 @@ absl::StatusOr<OffHeader> ParseHeader(TextLines& lines) {
   if (!ParseInteger(word, header.vertices) || !ParseInteger(TakeWord(line), header.faces)) {
     return absl::InvalidArgumentError(fmt::format("line {}: the counts of vertices and faces are no numbers", lines.line_number()));
   }
-  RETURN_IF_ERROR(CheckCounts(header, lines.remaining()));
+  RETURN_IF_ERROR(CheckCounts(header, lines.Remaining()));
   return header;
 }
 

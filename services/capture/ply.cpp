@@ -69,7 +69,7 @@ class PlyBody {
 
   /// What follows the last element; blanks and line ends count as nothing.
   std::size_t LeftOver() const {
-    const std::string_view rest = bytes_.substr(encoding_ == PlyEncoding::kAscii ? lines_.position() : position_);
+    const std::string_view rest = bytes_.substr(encoding_ == PlyEncoding::kAscii ? lines_.Position() : position_);
     return rest.find_first_not_of(std::string_view(" \t\r\n\0", 5)) == std::string_view::npos ? 0 : rest.size();
   }
 
@@ -131,7 +131,7 @@ struct VertexLayout {
   std::array<bool, 9> present = {};
   bool float_colours = false;  // 0 … 1 instead of 0 … 255
 
-  bool has(std::size_t first) const { return present[first] && present[first + 1] && present[first + 2]; }
+  bool Has(std::size_t first) const { return present[first] && present[first + 1] && present[first + 2]; }
 };
 
 absl::StatusOr<VertexLayout> LayOut(const PlyElement& element) {
@@ -149,7 +149,7 @@ absl::StatusOr<VertexLayout> LayOut(const PlyElement& element) {
     layout.slot.emplace_back(slot);
     if (slot >= 6 && !IsInteger(property.type)) layout.float_colours = true;
   }
-  if (!layout.has(0)) return absl::InvalidArgumentError("element vertex has no x, y and z: it is no point cloud or mesh");
+  if (!layout.Has(0)) return absl::InvalidArgumentError("element vertex has no x, y and z: it is no point cloud or mesh");
   return layout;
 }
 
@@ -185,14 +185,14 @@ absl::Status ReadVertices(const PlyElement& element, PlyBody& body, RawFrame& fr
   if (element.count > std::numeric_limits<std::int32_t>::max()) return absl::InvalidArgumentError("more than 2^31 vertices in one frame");
   const auto count = static_cast<std::size_t>(element.count);
   frame.mesh.vertices.reserve(count);
-  if (layout.has(3)) frame.normals.reserve(count);
-  if (layout.has(6)) frame.mesh.colours.reserve(count);
+  if (layout.Has(3)) frame.normals.reserve(count);
+  if (layout.Has(6)) frame.mesh.colours.reserve(count);
   std::array<double, 9> v = {};
   for (std::size_t i = 0; i < count; ++i) {
     if (absl::Status status = ReadVertex(element, layout, body, v); !status.ok()) return base::Annotate(status, fmt::format("vertex {}", i));
     frame.mesh.vertices.emplace_back(v[0], v[1], v[2]);
-    if (layout.has(3)) frame.normals.emplace_back(v[3], v[4], v[5]);
-    if (layout.has(6)) {
+    if (layout.Has(3)) frame.normals.emplace_back(v[3], v[4], v[5]);
+    if (layout.Has(6)) {
       const bool is_float = layout.float_colours;
       frame.mesh.colours.push_back(Rgb8{ToByte(v[6], is_float), ToByte(v[7], is_float), ToByte(v[8], is_float)});
     }

@@ -166,7 +166,7 @@ absl::StatusOr<PlyHeader> ParsePlyHeader(std::string_view bytes) {
     }
   }
   if (!has_format) return absl::InvalidArgumentError("the header has no 'format' line: the file is damaged");
-  header.body = lines.position();
+  header.body = lines.Position();
   RETURN_IF_ERROR(CheckCounts(header, bytes.size() - header.body));
   return header;
 }

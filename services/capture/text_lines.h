@@ -12,7 +12,7 @@ namespace vorocast::capture {
 class TextLines {
  public:
   /// A line longer than this is no line of a frame: the file is binary or damaged.
-  static constexpr std::size_t kLineMax = 64 * 1024;
+  static constexpr std::size_t kLineMax = 65536;
 
   /// `comment` starts a comment that runs to the end of its line; '\0': there are none.
   TextLines(std::string_view bytes, char comment) : bytes_(bytes), comment_(comment) {}
@@ -23,9 +23,9 @@ class TextLines {
   /// 1-based number of the line returned last.
   std::int64_t line_number() const { return line_number_; }
   /// Bytes that have not been read.
-  std::size_t remaining() const { return bytes_.size() - position_; }
+  std::size_t Remaining() const { return bytes_.size() - position_; }
   /// Offset of the first byte that has not been read.
-  std::size_t position() const { return position_; }
+  std::size_t Position() const { return position_; }
 
  private:
   std::string_view bytes_;

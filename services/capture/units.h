@@ -16,7 +16,7 @@ class UpRotation {
   static absl::StatusOr<UpRotation> Parse(const std::string& up);
 
   geometry::Vec3 operator*(const geometry::Vec3& v) const { return y_up_from_file_ * v; }
-  const geometry::Mat3& matrix() const { return y_up_from_file_; }
+  const geometry::Mat3& Matrix() const { return y_up_from_file_; }
 
  private:
   explicit UpRotation(const geometry::Mat3& y_up_from_file) : y_up_from_file_(y_up_from_file) {}

@@ -19,8 +19,8 @@ constexpr float kCompanionReach = 0.5F;  // in units of the extent, beyond the s
 constexpr double kHeightMin = 0.5;       // in units of the width
 constexpr double kHeightMax = 1.6;
 constexpr float kToesAgree = 0.8F;
-constexpr double kThreeQuarters_deg = 25;
-constexpr double kAzimuthStep_deg = 15;  // so that the stages of one take are seen from the same side, though they differ a little
+constexpr double kThreeQuartersDegrees = 25;
+constexpr double kAzimuthStepDegrees = 15;  // so that the stages of one take are seen from the same side, though they differ a little
 
 /// The values' range without the trimmed part of each end.
 std::pair<float, float> TrimmedRange(std::vector<float> values) {
@@ -81,8 +81,8 @@ double ChooseAzimuth(const std::vector<Bounds>& pictures) {
   if (front.dot(toes) < 0 || (front.dot(toes) == 0 && front.z() < 0)) front = -front;
   // Feet that agree with each other know better than the widest direction, which is none for a body with its arms down.
   if (toes.norm() > kToesAgree * toes_length && toes.norm() > 0) front = toes;
-  const double azimuth = std::atan2(static_cast<double>(front.x()), static_cast<double>(front.z())) * 180 / std::numbers::pi + kThreeQuarters_deg;
-  return kAzimuthStep_deg * std::round(azimuth / kAzimuthStep_deg);
+  const double azimuth = std::atan2(static_cast<double>(front.x()), static_cast<double>(front.z())) * 180 / std::numbers::pi + kThreeQuartersDegrees;
+  return kAzimuthStepDegrees * std::round(azimuth / kAzimuthStepDegrees);
 }
 
 absl::Status Settle(Bounds& bounds) {

@@ -17,7 +17,7 @@ using geometry::Rigid3;
 using geometry::Vec3;
 using geometry::Vec3f;
 
-const Vec3f kMetal(0.46F, 0.47F, 0.49F);
+Vec3f Metal() { return {0.46F, 0.47F, 0.49F}; }
 /// The skin stands out from the cut faces within.
 constexpr float kSkinWhite = 0.10F;
 constexpr float kCutDark = 0.72F;
@@ -64,7 +64,7 @@ Triangles MakeObject(const geometry::TriangleMesh& object, const Rigid3& world_f
   mesh.metal = true;
   for (const auto& triangle : object.triangles) {
     for (std::int32_t v : triangle) mesh.corners.push_back((world_from_object * object.vertices[static_cast<std::size_t>(v)]).cast<float>());
-    mesh.colours.push_back(kMetal);
+    mesh.colours.push_back(Metal());
   }
   return mesh;
 }

@@ -31,12 +31,12 @@ float SrgbFromLinear(float value) { return value <= 0.0031308F ? 12.92F * value 
 }  // namespace
 
 Vec3f LinearFromRgb8(const geometry::Rgb8& colour) {
-  static const std::array<float, 256> kTable = [] {
+  static const std::array<float, 256> linear_of_level = [] {
     std::array<float, 256> table;
     for (std::size_t i = 0; i < 256; ++i) table[i] = LinearFromSrgb(static_cast<float>(i) / 255);
     return table;
   }();
-  return {kTable[colour[0]], kTable[colour[1]], kTable[colour[2]]};
+  return {linear_of_level[colour[0]], linear_of_level[colour[1]], linear_of_level[colour[2]]};
 }
 
 geometry::Rgb8 Rgb8FromLinear(const Vec3f& colour) {

@@ -26,8 +26,8 @@ constexpr std::array<std::array<float, 2>, kSamples> kLens = {{{0.125F, 0.625F},
 constexpr float kKeyAzimuth = -0.85F;   // radians from the camera, to its left
 constexpr float kKeyElevation = 0.85F;  // radians
 constexpr float kKeyRadius = 0.10F;     // radians: softness of shadows
-const Vec3f kKeyColour(1.22F, 1.15F, 1.05F);
-const Vec3f kSkyColour(0.66F, 0.70F, 0.76F);
+Vec3f KeyColour() { return {1.22F, 1.15F, 1.05F}; }
+Vec3f SkyColour() { return {0.66F, 0.70F, 0.76F}; }
 constexpr float kGroundGlow = 0.62F;  // light from below, as a part of the sky's
 constexpr float kSkyReach = 0.40F;    // ambient shadows reach this far, in units of the extent
 constexpr float kFar = 1e4F;
@@ -66,7 +66,7 @@ std::array<float, 2> Disc2(float u, float v) {
 
 Vec3f SkyLight(const Vec3f& direction) {
   const float up = direction.y();
-  return up >= 0 ? Vec3f(kSkyColour * (0.85F + 0.3F * up)) : Vec3f(kSkyColour * (kGroundGlow + 0.23F * (1 + up)));
+  return up >= 0 ? Vec3f(SkyColour() * (0.85F + 0.3F * up)) : Vec3f(SkyColour() * (kGroundGlow + 0.23F * (1 + up)));
 }
 
 /// Renders one picture; holds what does not change from pixel to pixel.
@@ -105,7 +105,7 @@ class Painter {
     const Vec3f normal = behind ? Vec3f(-hit.normal) : hit.normal;
     const Vec3f colour = behind ? Vec3f(0.35F * hit.colour + Vec3f(0.03F, 0.04F, 0.06F)) : hit.colour;
     const Vec3f from = ray.origin + hit.distance * ray.direction + hit.clearance * normal;
-    const Vec3f key = Key(from, normal, kKeyRaysSurface, sample, jitter) * kKeyColour;
+    const Vec3f key = Key(from, normal, kKeyRaysSurface, sample, jitter) * KeyColour();
     const Vec3f light = key * std::max(normal.dot(key_), 0.0F) + Sky(from, normal, sample, jitter);
     if (!hit.metal) return Expose(colour.cwiseProduct(light));
     const Vec3f mirrored = ray.direction - 2 * normal.dot(ray.direction) * normal;
@@ -118,8 +118,8 @@ class Painter {
   Vec3f Ground(const Vec3f& point, int sample, const Jitter& jitter, const Vec3f& backdrop) const {
     const Vec3f up = Vec3f::UnitY();
     const Vec3f from = point + 1e-4F * up;
-    const Vec3f open = key_.y() * kKeyColour + OpenSky();
-    const Vec3f light = Key(from, up, kKeyRaysGround, sample, jitter) * key_.y() * kKeyColour + Sky(from, up, sample, jitter);
+    const Vec3f open = key_.y() * KeyColour() + OpenSky();
+    const Vec3f light = Key(from, up, kKeyRaysGround, sample, jitter) * key_.y() * KeyColour() + Sky(from, up, sample, jitter);
     if (light == open) return backdrop;
     return backdrop.cwiseProduct(light.cwiseQuotient(open).cwiseMin(1.0F));
   }
@@ -161,7 +161,7 @@ class Painter {
   }
 
   /// What Sky comes to over open ground: the mean of SkyLight over the upper hemisphere, cosine-weighted (mean of the height is 2/3).
-  static Vec3f OpenSky() { return kSkyColour * (0.85F + 0.3F * 2 / 3); }
+  static Vec3f OpenSky() { return SkyColour() * (0.85F + 0.3F * 2 / 3); }
 
   /// Bright light bends towards white instead of breaking off.
   static Vec3f Expose(const Vec3f& colour) {

@@ -24,7 +24,7 @@ constexpr float kWidest = 1.5F;
 /// Captured colours hold the light of the stage already: without a lift they would be lit, and darkened, twice.
 constexpr float kLift = 1.15F;
 constexpr float kBlack = 0.012F;
-const Vec3f kClay(0.72F, 0.62F, 0.53F);
+Vec3f Clay() { return {0.72F, 0.62F, 0.53F}; }
 
 /// nanoflann's view of the positions.
 struct Positions {
@@ -68,7 +68,7 @@ std::vector<Disc> MakeDiscs(const geometry::OrientedPoints& points) {
     discs.push_back({.centre = points.positions[i].cast<float>(),
                      .normal = points.normals[i].cast<float>(),
                      .radius = radii[i],
-                     .colour = points.colours.empty() ? kClay : Vec3f(kLift * LinearFromRgb8(points.colours[i]) + Vec3f::Constant(kBlack))});
+                     .colour = points.colours.empty() ? Clay() : Vec3f(kLift * LinearFromRgb8(points.colours[i]) + Vec3f::Constant(kBlack))});
   }
   return discs;
 }

@@ -30,8 +30,8 @@ struct Grid {
   std::int32_t title_height;  // 0 without a title
   std::int32_t picture_width, picture_height;
 
-  std::int32_t width() const { return gap + columns * (picture_width + gap); }
-  std::int32_t height() const { return title_height + gap + rows * (picture_height + label_height); }
+  std::int32_t Width() const { return gap + columns * (picture_width + gap); }
+  std::int32_t Height() const { return title_height + gap + rows * (picture_height + label_height); }
 };
 
 Grid LayOut(std::size_t count, const Camera& camera, const SheetLayout& layout) {
@@ -47,7 +47,7 @@ Grid LayOut(std::size_t count, const Camera& camera, const SheetLayout& layout) 
     candidate.columns = columns;
     candidate.rows = (static_cast<std::int32_t>(count) + columns - 1) / columns;
     const double holes = static_cast<double>(candidate.columns * candidate.rows) / static_cast<double>(count);
-    const double ratio = static_cast<double>(candidate.width()) / candidate.height();
+    const double ratio = static_cast<double>(candidate.Width()) / candidate.Height();
     const double cost = std::abs(std::log(ratio / kSheetRatio)) + 1.5 * (holes - 1);
     if (cost >= best) continue;
     best = cost;
@@ -108,7 +108,7 @@ absl::StatusOr<Bounds> BoundsOfAll(const std::vector<Bounds>& pictures) {
 /// A sheet of paper with its title and labels, before the pictures are pasted in.
 template <typename Picture>
 Image Print(const std::vector<Picture>& pictures, const Grid& grid, const std::string& title) {
-  Image sheet{.width = grid.width(), .height = grid.height(), .rgb = {}};
+  Image sheet{.width = grid.Width(), .height = grid.Height(), .rgb = {}};
   const auto pixels = static_cast<std::size_t>(sheet.width) * static_cast<std::size_t>(sheet.height);
   sheet.rgb.reserve(3 * pixels);
   for (std::size_t i = 0; i < pixels; ++i) sheet.rgb.insert(sheet.rgb.end(), kPaper.begin(), kPaper.end());
@@ -137,9 +137,9 @@ absl::StatusOr<Image> Render(const std::vector<Picture>& pictures, const SheetLa
   const double azimuth_deg = layout.azimuth_deg ? *layout.azimuth_deg : ChooseAzimuth(each);
   const Camera camera = FrameBounds(bounds, {.azimuth_deg = azimuth_deg, .elevation_deg = layout.elevation_deg, .width = layout.picture_width});
   const Grid grid = LayOut(pictures.size(), camera, layout);
-  if (static_cast<double>(grid.width()) * grid.height() > kPixelsMax) {
+  if (static_cast<double>(grid.Width()) * grid.Height() > kPixelsMax) {
     return absl::InvalidArgumentError(
-        fmt::format("a sheet of {} × {} pixels is too large: ask for fewer or smaller pictures", grid.width(), grid.height()));
+        fmt::format("a sheet of {} × {} pixels is too large: ask for fewer or smaller pictures", grid.Width(), grid.Height()));
   }
   Image sheet = Print(pictures, grid, layout.title);
   for (std::size_t i = 0; i < pictures.size(); ++i) {

@@ -41,8 +41,8 @@ TEST(UpRotation, TurnsEveryAxisUpWithoutMirroring) {
     const auto rotation = UpRotation::Parse(name);
     ASSERT_TRUE(rotation.ok());
     EXPECT_EQ(*rotation * axis, Vec3(0, 1, 0)) << name;
-    EXPECT_EQ(rotation->matrix().determinant(), 1) << name;
-    EXPECT_EQ(rotation->matrix() * rotation->matrix().transpose(), geometry::Mat3::Identity()) << name;
+    EXPECT_EQ(rotation->Matrix().determinant(), 1) << name;
+    EXPECT_EQ(rotation->Matrix() * rotation->Matrix().transpose(), geometry::Mat3::Identity()) << name;
   }
   // 180 degrees about x.
   EXPECT_EQ(*UpRotation::Parse("-y") * Vec3(1, 2, 3), Vec3(1, -2, -3));

@@ -57,7 +57,7 @@ TEST(InspectCapture, GathersFactsAndGoesOnPastBadFrames) {
   EXPECT_THAT(text, HasSubstr("frame 2: cannot be used: line 1: a vertex has 2 numbers"));
   EXPECT_THAT(text, HasSubstr("frame 3: 100 points, no normals (they are estimated)"));
   EXPECT_THAT(text, HasSubstr("1 of 4 frames cannot be used"));
-  EXPECT_THAT(text, HasSubstr("1 frames have 2 parts where 1 are expected"));
+  EXPECT_THAT(text, HasSubstr("1 frame of 2 parts where 1 are expected"));
 }
 
 TEST(Describe, HintsAtAWrongUnit) {
