@@ -109,6 +109,7 @@ void TouchFace(const CellHull& reference, int face, const CellHull& other, const
 CellHull::CellHull(const CellShape& shape, float units) {
   VOROCAST_CHECK(shape.hull.size() <= static_cast<std::size_t>(kCorners));
   corner_count = static_cast<int>(shape.hull.size());
+  radius = units * static_cast<float>(shape.radius);
   std::vector<float> coordinates;
   for (int i = 0; i < kCorners; ++i) {
     const geometry::Vec3f corner = units * shape.hull[i < corner_count ? static_cast<std::size_t>(i) : 0].cast<float>();

@@ -32,6 +32,7 @@ class CellHull : public btConvexHullShape {
   Corners corner_x, corner_y, corner_z;              // body frame, Bullet units, without margin
   Faces normal_x, normal_y, normal_z, plane_offset;  // outwards: a face's points have normal·x = offset
   int corner_count = 0;
+  float radius = 0;                          // CellShape::radius in Bullet units
   std::vector<Eigen::Vector3f> all_corners;  // with those that the hull was thinned out of: the ground is flat, and shows what sinks into it
 };
 

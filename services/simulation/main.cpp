@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 // vorocast-simulation: runs effects on tracked takes, as the last stage of the scheduler's jobs and through a gRPC door of its own.
-#include <unistd.h>
-
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <cstdlib>
@@ -13,6 +11,7 @@
 #include <vector>
 
 #include <fmt/format.h>
+#include "services/base/processor.h"
 #include "services/lease/drain_signals.h"
 #include "services/lease/lease_loop.h"
 #include "services/rpc/server.h"
@@ -22,18 +21,6 @@
 namespace {
 
 using namespace vorocast;
-
-#ifdef __AVX2__
-/// Says so in words, before the first instruction that an older processor does not know: the program is built for x86-64-v3.
-[[gnu::constructor(101), gnu::target("arch=x86-64")]] void RequireInstructionSet() {
-  __builtin_cpu_init();
-  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("bmi2")) return;
-  static constexpr char kMessage[] =
-      "vorocast-simulation: this processor lacks AVX2, FMA or BMI2; use another machine, or build with -DVOROCAST_MARCH=x86-64\n";
-  [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, kMessage, sizeof(kMessage) - 1);
-  ::_exit(EXIT_FAILURE);
-}
-#endif
 
 constexpr char kStory[] =
     "Runs effects on tracked takes with rigid-body physics. With --scheduler it takes simulation tasks from a Vorocast scheduler;\n"
@@ -81,6 +68,7 @@ absl::Status Serve(const Options& options) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  base::RequireProcessor();
   CLI::App app(kStory, "vorocast-simulation");
   Options options;
   double drain_seconds = absl::ToDoubleSeconds(options.lease.drain_time);
@@ -93,6 +81,10 @@ int main(int argc, char** argv) {
   app.add_option("--name", options.lease.name, "Name among the workers; host, process number and start time if not given");
   app.add_option("--drain-time", drain_seconds, "Seconds that running simulations get after SIGTERM before they are given back")
       ->check(CLI::Range(0.0, 86400.0))
+      ->capture_default_str();
+  double leave_after_seconds = 0;
+  app.add_option("--leave-after", leave_after_seconds, "Leaves by itself when the scheduler has been away for so many seconds (0: never)")
+      ->check(CLI::Range(0.0, 1e7))
       ->capture_default_str();
   CLI::App* execute_task = app.add_subcommand("execute-task", "Runs one task given on standard input; the program starts this itself");
   CLI11_PARSE(app, argc, argv);
@@ -109,6 +101,7 @@ int main(int argc, char** argv) {
   std::error_code error;
   options.lease.program = std::filesystem::read_symlink("/proc/self/exe", error);
   options.lease.drain_time = absl::Seconds(drain_seconds);
+  if (leave_after_seconds > 0) options.lease.leave_after = absl::Seconds(leave_after_seconds);
   const absl::Status status = Serve(options);
   if (status.ok()) return EXIT_SUCCESS;
   fmt::print(stderr, "vorocast-simulation: {}\n", std::string(status.message()));

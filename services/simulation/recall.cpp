@@ -10,8 +10,10 @@ using geometry::Vec3;
 
 Spring MakeSpring(double stiffness, double damping_ratio) { return {.stiffness = stiffness, .damping = 2 * damping_ratio * std::sqrt(stiffness)}; }
 
+double Resistance(const Spring& spring, double dt) { return 1 + dt * spring.damping + dt * dt * spring.stiffness; }
+
 Vec3 NextDeviationVelocity(const Spring& spring, const Vec3& deviation, const Vec3& velocity, double dt) {
-  return (velocity - dt * spring.stiffness * deviation) / (1 + dt * spring.damping + dt * dt * spring.stiffness);
+  return (velocity - dt * spring.stiffness * deviation) / Resistance(spring, dt);
 }
 
 Vec3 RotationVector(const Quat& rotation) {
@@ -40,7 +42,7 @@ RecallStep Recall(const Spring& linear, const Spring& angular, const RecallInput
 
   return {.velocity = (input.next_target.translation - input.target.translation) / dt + next_velocity,
           .angular_velocity = RotationVector(input.next_target.rotation * input.target.rotation.conjugate()) / dt + next_turn_velocity,
-          .acceleration = (next_velocity - deviation_velocity).norm() / dt};
+          .acceleration = (linear.stiffness * deviation + linear.damping * deviation_velocity).norm()};
 }
 
 void Advance(BodyState& body, double dt) {

@@ -34,10 +34,13 @@ geometry::Vec3 NextDeviationVelocity(const Spring& spring, const geometry::Vec3&
 geometry::Vec3 RotationVector(const geometry::Quat& rotation);
 geometry::Quat FromRotationVector(const geometry::Vec3& vector);
 
+/// How much harder than its mass a body on an implicit spring is to push within a step: w' = w'_free + impulse / (resistance × mass).
+double Resistance(const Spring& spring, double dt);
+
 struct RecallStep {
-  geometry::Vec3 velocity;          // that carries the body through the coming step
-  geometry::Vec3 angular_velocity;  //
-  double acceleration = 0;          // of the recall force, metres a second squared
+  geometry::Vec3 velocity;  // that carries the body through the coming step if nothing touches it
+  geometry::Vec3 angular_velocity;
+  double acceleration = 0;  // of the recall force as the body is now, |k e + λ w|, metres a second squared
 };
 
 /// The velocities of a recalled body for a step of dt in which its tracked pose goes from `target` to `next_target`; `target_velocity`

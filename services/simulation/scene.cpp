@@ -139,11 +139,7 @@ class Placer {
     // Heading 90° is +z, so it turns the x axis about −y.
     body.hinge = SceneBody::Hinge{.world_from_pivot = {TurnAbout(Vec3::UnitY(), -heading), pivot}, .arm = pendulum.arm_m, .swing = swing};
     body.start_s = std::max(swing.start_time(), 0.0);
-    const Rigid3 start = body.DrivenPose(body.start_s);
-    body.start.position = start.translation;
-    body.start.rotation = start.rotation;
-    body.start.angular_velocity = swing.AngularVelocity(body.start_s) * (start.rotation * Vec3::UnitZ());
-    body.start.velocity = body.start.angular_velocity.cross(start.translation - pivot);
+    body.start = body.StateWhenLoose(body.start_s);
     return body;
   }
 
@@ -159,6 +155,16 @@ class Placer {
 Rigid3 SceneBody::DrivenPose(double time) const {
   const Rigid3 pivot_from_object{TurnAbout(Vec3::UnitZ(), hinge->swing.Angle(time)), Vec3::Zero()};
   return hinge->world_from_pivot * pivot_from_object * body_from_object.Inverse();
+}
+
+BodyState SceneBody::StateWhenLoose(double time) const {
+  if (!hinge) return start;
+  const Rigid3 pose = DrivenPose(time);
+  const Vec3 turning = hinge->swing.AngularVelocity(time) * (pose.rotation * Vec3::UnitZ());
+  return {.position = pose.translation,
+          .rotation = pose.rotation,
+          .velocity = turning.cross(pose.translation - hinge->world_from_pivot.translation),
+          .angular_velocity = turning};
 }
 
 double LowestPoint(const Cells& cells, const TrackedMotion& motion) {

@@ -19,7 +19,7 @@ namespace vorocast::simulation {
 struct SceneBody {
   enum class Motion : std::uint8_t {
     kFixed,   // never moves
-    kLoose,   // held until start_s, then moves by physics from `start`
+    kLoose,   // held until start_s, then moves by physics
     kDriven,  // follows `swing` whatever it hits
   };
   std::string name;
@@ -44,6 +44,8 @@ struct SceneBody {
 
   /// Where a driven body is at `time`.
   geometry::Rigid3 DrivenPose(double time) const;
+  /// The state in which a loose body is let go at `time`, the first step's at or after start_s: `start`, or a pendulum's in its swing.
+  BodyState StateWhenLoose(double time) const;
 };
 
 struct Scene {

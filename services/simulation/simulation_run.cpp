@@ -17,6 +17,7 @@ using geometry::Quat;
 using geometry::Rigid3;
 using geometry::Vec3;
 
+constexpr double kEarly = 1e-9;                 // times are sums of steps, and sums round
 constexpr double kGoneDistance = 100;           // metres from the middle of the first frame
 constexpr double kNearPad = 0.005;              // metres, beyond what moves within a step
 constexpr int kStepsUntilOut = 8;               // a recalled cell stays in the world so long after the last foreign thing left
@@ -91,7 +92,6 @@ void SimulationRun::Release(std::size_t c) {
 }
 
 void SimulationRun::ReleaseDueCells() {
-  constexpr double kEarly = 1e-9;  // times are sums of steps, and sums round
   for (std::size_t c = 0; c < cells_.size(); ++c) {
     if (cells_[c].state == CellState::kRecalled && release_time_[c] <= time_ + kEarly) Release(c);
   }
@@ -160,7 +160,10 @@ void SimulationRun::RecallCells(double dt) {
       continue;
     }
     if (world_.Contains(c)) {
-      world_.SetVelocity(c, step.velocity, step.angular_velocity);
+      world_.SetVelocity(c, {.velocity = step.velocity,
+                             .angular_velocity = step.angular_velocity,
+                             .resistance = Resistance(linear_spring_, dt),
+                             .angular_resistance = Resistance(angular_spring_, dt)});
       continue;
     }
     cell.body.velocity = step.velocity;
@@ -184,8 +187,8 @@ void SimulationRun::MoveObjects(double dt) {
   for (std::size_t i = 0; i < scene_.bodies.size(); ++i) {
     const SceneBody& body = scene_.bodies[i];
     if (body.motion == SceneBody::Motion::kDriven) world_.Drive(i, body.DrivenPose(time_ + dt));
-    if (body.motion == SceneBody::Motion::kLoose && !object_loosened_[i] && body.start_s < time_ + 0.5 * dt) {
-      world_.Loosen(i);
+    if (body.motion == SceneBody::Motion::kLoose && !object_loosened_[i] && body.start_s <= time_ + kEarly) {
+      world_.Loosen(i, body.StateWhenLoose(time_));
       object_loosened_[i] = true;
     }
   }

@@ -4,6 +4,9 @@
 #include <BulletDynamics/ConstraintSolver/btHingeConstraint.h>
 #include <btBulletDynamicsCommon.h>
 
+#include <algorithm>
+#include <limits>
+
 #include "services/base/check.h"
 #include "services/simulation/cell_collision.h"
 #include "services/simulation/near_pairs.h"
@@ -60,8 +63,23 @@ struct CellBody {
   std::unique_ptr<CellHull> shape;
   std::unique_ptr<btRigidBody> body;
   Quat cell_from_body;
+  float mass = 0;
+  btVector3 inertia;
+  float resistance = 1;  // the body has mass × resistance now, and likewise
+  float angular_resistance = 1;
   bool inside = false;
+  bool released = false;
 };
+
+void SetMass(CellBody& cell, double resistance, double angular_resistance) {
+  const auto linear = static_cast<float>(resistance);
+  const auto angular = static_cast<float>(angular_resistance);
+  if (cell.resistance == linear && cell.angular_resistance == angular) return;
+  cell.resistance = linear;
+  cell.angular_resistance = angular;
+  cell.body->setMassProps(cell.mass * linear, cell.inertia * angular);
+  cell.body->updateInertiaTensor();
+}
 
 struct ObjectBody {
   std::unique_ptr<btCollisionShape> shape;
@@ -70,7 +88,6 @@ struct ObjectBody {
   double mass = 0;
   double arm = 0;  // of a pendulum, metres
   bool driven = false;
-  BodyState start;
 };
 
 }  // namespace
@@ -89,6 +106,30 @@ struct World::Bodies {
   std::vector<CellBody> cells;
   std::vector<ObjectBody> objects;
   btVector3 gravity{0, 0, 0};
+
+  /// A few iterations cannot carry a heap on a light cell: what the contacts left below the ground is put back on it.
+  void LiftOutOfGround() {
+    constexpr float kSlop = 0.1F;  // Bullet units that contacts may work with
+    const float ground_height = ground_shape->getPlaneConstant();
+    for (CellBody& cell : cells) {
+      if (!cell.inside || !cell.released || !cell.body->isActive()) continue;
+      const btTransform& pose = cell.body->getWorldTransform();
+      if (pose.getOrigin().y() - cell.shape->radius > ground_height - kSlop) continue;
+      float lowest = std::numeric_limits<float>::max();
+      const btVector3& up = pose.getBasis()[1];
+      for (const Eigen::Vector3f& corner : cell.shape->all_corners)
+        lowest = std::min(lowest, up.x() * corner.x() + up.y() * corner.y() + up.z() * corner.z());
+      const float lift = ground_height - kSlop - (pose.getOrigin().y() + lowest);
+      if (lift <= 0) continue;
+      btTransform lifted = pose;
+      lifted.getOrigin().setY(pose.getOrigin().y() + lift);
+      cell.body->setWorldTransform(lifted);
+      cell.body->setInterpolationWorldTransform(lifted);
+      btVector3 velocity = cell.body->getLinearVelocity();
+      velocity.setY(std::max(velocity.y(), 0.0F));
+      cell.body->setLinearVelocity(velocity);
+    }
+  }
 
   ~Bodies() {
     for (ObjectBody& object : objects) {
@@ -129,8 +170,9 @@ void World::AddCells(const std::vector<CellShape>& shapes, const Surface& surfac
     CellBody cell;
     cell.cell_from_body = shape.cell_from_body;
     cell.shape = std::make_unique<CellHull>(shape, static_cast<float>(kUnits));
-    btRigidBody::btRigidBodyConstructionInfo info(static_cast<float>(shape.mass), nullptr, cell.shape.get(),
-                                                  ToBullet(kUnits * kUnits * shape.inertia));
+    cell.mass = static_cast<float>(shape.mass);
+    cell.inertia = ToBullet(kUnits * kUnits * shape.inertia);
+    const btRigidBody::btRigidBodyConstructionInfo info(cell.mass, nullptr, cell.shape.get(), cell.inertia);
     cell.body = std::make_unique<btRigidBody>(info);
     // Gyroscopic torque is nothing to see on lumps, and a recalled cell's rotation is not Bullet's to change.
     cell.body->setFlags(BT_DISABLE_WORLD_GRAVITY);
@@ -144,7 +186,6 @@ void World::AddObject(const SceneBody& scene_body) {
   ObjectBody object;
   object.mass = scene_body.mass;
   object.arm = scene_body.hinge ? scene_body.hinge->arm : 0;
-  object.start = scene_body.start;
   object.driven = scene_body.motion == SceneBody::Motion::kDriven;
   if (scene_body.box_half) {
     auto box = std::make_unique<btBoxShape>(LengthToBullet(*scene_body.box_half));
@@ -155,7 +196,7 @@ void World::AddObject(const SceneBody& scene_body) {
   }
   // Held objects and fixed ones have no mass until they are let go.
   object.body = std::make_unique<btRigidBody>(btRigidBody::btRigidBodyConstructionInfo(0, nullptr, object.shape.get()));
-  PlaceBody(*object.body, {.position = object.start.position, .rotation = object.start.rotation}, Quat::Identity());
+  PlaceBody(*object.body, {.position = scene_body.start.position, .rotation = scene_body.start.rotation}, Quat::Identity());
   object.body->setDamping(0, 0);
   SetSurface(*object.body, scene_body.surface);
   if (object.driven) {
@@ -171,6 +212,8 @@ void World::Enter(std::size_t index, Role role, const BodyState& state) {
   PlaceBody(*cell.body, state, cell.cell_from_body);
   cell.body->clearForces();
   const bool recalled = role == Role::kRecalled;
+  cell.released = !recalled;
+  SetMass(cell, 1, 1);
   cell.body->setDamping(0, recalled ? 0 : kAngularDamping);
   cell.body->setGravity(recalled ? btVector3(0, 0, 0) : bodies_->gravity);
   cell.body->forceActivationState(recalled ? DISABLE_DEACTIVATION : ACTIVE_TAG);
@@ -195,10 +238,11 @@ void World::Leave(std::size_t index) {
 
 bool World::Contains(std::size_t index) const { return bodies_->cells[index].inside; }
 
-void World::SetVelocity(std::size_t index, const Vec3& velocity, const Vec3& angular_velocity) {
-  btRigidBody& body = *bodies_->cells[index].body;
-  body.setLinearVelocity(LengthToBullet(velocity));
-  body.setAngularVelocity(ToBullet(angular_velocity));
+void World::SetVelocity(std::size_t index, const Push& push) {
+  CellBody& cell = bodies_->cells[index];
+  SetMass(cell, push.resistance, push.angular_resistance);
+  cell.body->setLinearVelocity(LengthToBullet(push.velocity));
+  cell.body->setAngularVelocity(ToBullet(push.angular_velocity));
 }
 
 BodyState World::State(std::size_t index) const {
@@ -215,14 +259,14 @@ void World::Drive(std::size_t index, const Rigid3& world_from_body) {
   object.body->setWorldTransform(ToBullet(world_from_body.translation, world_from_body.rotation));
 }
 
-void World::Loosen(std::size_t index) {
+void World::Loosen(std::size_t index, const BodyState& state) {
   ObjectBody& object = bodies_->objects[index];
   bodies_->world.removeRigidBody(object.body.get());
   btVector3 inertia;
   object.shape->calculateLocalInertia(static_cast<float>(object.mass), inertia);
   object.body->setMassProps(static_cast<float>(object.mass), inertia);
   object.body->setFlags(0);
-  PlaceBody(*object.body, object.start, Quat::Identity());
+  PlaceBody(*object.body, state, Quat::Identity());
   object.body->forceActivationState(object.arm > 0 ? DISABLE_DEACTIVATION : ACTIVE_TAG);
   object.body->setSleepingThresholds(kSleepSpeed, kSleepTurn);
   bodies_->world.addRigidBody(object.body.get(), kObject, kGround | kRecalledCell | kReleasedCell | kObject);
@@ -242,6 +286,9 @@ geometry::Box3 World::ObjectBounds(std::size_t index) const {
   return {FromBullet(low) / kUnits, FromBullet(high) / kUnits};
 }
 
-void World::Step(double dt) { bodies_->world.stepSimulation(static_cast<float>(dt), 0); }
+void World::Step(double dt) {
+  bodies_->world.stepSimulation(static_cast<float>(dt), 0);
+  if (bodies_->ground) bodies_->LiftOutOfGround();
+}
 
 }  // namespace vorocast::simulation

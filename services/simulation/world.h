@@ -30,8 +30,14 @@ class World {
   void Enter(std::size_t cell, Role role, const BodyState& state);
   void Leave(std::size_t cell);
   bool Contains(std::size_t cell) const;
-  /// A recalled cell's velocities for the coming step.
-  void SetVelocity(std::size_t cell, const geometry::Vec3& velocity, const geometry::Vec3& angular_velocity);
+  /// A recalled cell's velocities for the coming step, and how much harder than by its mass it is to push in it (recall.h).
+  struct Push {
+    geometry::Vec3 velocity;
+    geometry::Vec3 angular_velocity;
+    double resistance = 1;
+    double angular_resistance = 1;
+  };
+  void SetVelocity(std::size_t cell, const Push& push);
   /// In the cell's frame (template axes). The cell is in the world.
   BodyState State(std::size_t cell) const;
   /// Whether the cell lies still and is left out of the computation until something touches it.
@@ -39,8 +45,8 @@ class World {
 
   /// Moves a driven object to where it is at the end of the coming step.
   void Drive(std::size_t object, const geometry::Rigid3& world_from_body);
-  /// Lets a held loose object go.
-  void Loosen(std::size_t object);
+  /// Lets a held loose object go, in the given state.
+  void Loosen(std::size_t object, const BodyState& state);
   BodyState ObjectState(std::size_t object) const;
   geometry::Box3 ObjectBounds(std::size_t object) const;
 

@@ -1,0 +1,233 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "services/simulation/effect.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <set>
+
+#include "services/simulation/effect_settings.h"
+#include "services/simulation/shipped_effects.h"
+
+namespace vorocast::simulation {
+namespace {
+
+using nlohmann::json;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+std::string Refusal(const json& effect) {
+  const auto result = NormaliseEffect(effect);
+  EXPECT_FALSE(result.ok()) << effect;
+  if (result.ok()) return "";
+  EXPECT_EQ(result.status().code(), absl::StatusCode::kInvalidArgument);
+  return std::string(result.status().message());
+}
+
+TEST(Effect, ShipsThree) { EXPECT_THAT(ShippedEffects(), ElementsAre("calm", "pendulum", "release")); }
+
+TEST(Effect, ShippedOnesLoadAndAreTheFilesOfTheEffectsFolder) {
+  for (const std::string& name : ShippedEffects()) {
+    const auto embedded = LoadEffect(name);
+    ASSERT_TRUE(embedded.ok()) << embedded.status();
+    EXPECT_EQ((*embedded)["name"], name);
+    EXPECT_FALSE((*embedded)["description"].get<std::string>().empty());
+    const auto file = LoadEffect(std::string(VOROCAST_SOURCE_DIR) + "/effects/" + name + ".json");
+    ASSERT_TRUE(file.ok()) << file.status();
+    EXPECT_EQ(*embedded, *file);
+  }
+}
+
+TEST(Effect, CanonicalFormIsCompleteAndStaysAsItIs) {
+  for (const std::string& name : ShippedEffects()) {
+    const json effect = *LoadEffect(name);
+    EXPECT_EQ(*NormaliseEffect(effect), effect);
+    EXPECT_EQ(NormaliseEffect(effect)->dump(), effect.dump());
+  }
+}
+
+TEST(Effect, DefaultsAreFilledIn) {
+  const json effect = *NormaliseEffect({{"name", "x"}});
+  EXPECT_EQ(effect["gravity_m_s2"], 9.81);
+  EXPECT_EQ(effect["recall"]["stiffness_s2"], 1000.0);
+  EXPECT_EQ(effect["recall"]["damping_ratio"], 1.0);
+  EXPECT_EQ(effect["ground"]["height_m"], "lowest");
+  EXPECT_EQ(effect["rupture"]["acceleration_m_s2"], "never");
+  EXPECT_EQ(effect["objects"], json::array());
+}
+
+TEST(Effect, OneEffectHasOneForm) {
+  EXPECT_EQ(NormaliseEffect({{"name", "x"}, {"rate_hz", 120}})->dump(),
+            NormaliseEffect({{"rate_hz", 120.0}, {"name", "x"}, {"ground", json::object()}})->dump());
+  EXPECT_EQ(NormaliseEffect({{"name", "x"}, {"gravity_m_s2", -0.0}})->dump(), NormaliseEffect({{"name", "x"}, {"gravity_m_s2", 0}})->dump());
+}
+
+TEST(Effect, RefusalsNameTheFieldAndWhatItMayHold) {
+  EXPECT_EQ(Refusal({{"name", "x"}, {"objects", {{{"kind", "ballon"}}}}}), "effect: objects[0].kind: \"ballon\" is none of box, sphere, pendulum");
+  EXPECT_EQ(Refusal({{"name", "x"}, {"objects", {{{"name", "b"}}}}}), "effect: objects[0].kind: missing; it must be one of box, sphere, pendulum");
+  EXPECT_EQ(Refusal({{"name", "x"}, {"recall", {{"stiffness_s2", "soft"}}}}),
+            "effect: recall.stiffness_s2: \"soft\" is not a number from 0 to 1000000");
+  EXPECT_EQ(Refusal({{"name", "x"}, {"recall", {{"stiffness_s2", -1}}}}), "effect: recall.stiffness_s2: -1 is not a number from 0 to 1000000");
+  EXPECT_EQ(Refusal({{"name", "x"}, {"ground", {{"height_m", "low"}}}}),
+            "effect: ground.height_m: \"low\" is not \"lowest\" or a number from -1000 to 1000");
+  EXPECT_EQ(Refusal({{"name", "x"}, {"rupture", {{"acceleration_m_s2", 0}}}}),
+            "effect: rupture.acceleration_m_s2: 0 is not \"never\" or a number above 0 and up to 1000000");
+  EXPECT_EQ(Refusal({{"name", "x"}, {"ground", {{"enabled", 1}}}}), "effect: ground.enabled: 1 is not true or false");
+  EXPECT_EQ(Refusal({{"name", ""}}), "effect: name: \"\" is not a text of 1 to 100 characters");
+  EXPECT_EQ(Refusal(json::object()), "effect: name: missing; it must be a text of 1 to 100 characters");
+  EXPECT_EQ(Refusal(json::array()), "effect: [] is not an object");
+  EXPECT_EQ(Refusal({{"name", "x"}, {"cells", {{"colour", 1}}}}),
+            "effect: cells.\"colour\": there is no such field; there are density_kg_m3, friction, restitution, shrink_m");
+  EXPECT_EQ(Refusal({{"name", "x"}, {"objects", {{{"kind", "sphere"}}}}}), "effect: objects[0].position_m: missing; it must be a list of 3 items");
+  EXPECT_EQ(Refusal({{"name", "x"}, {"objects", {{{"kind", "sphere"}, {"position_m", {0, 1}}}}}}),
+            "effect: objects[0].position_m: [0,1] is not a list of 3 items");
+  EXPECT_EQ(Refusal({{"name", "x"}, {"objects", {{{"kind", "sphere"}, {"position_m", {0, 1, "a"}}}}}}),
+            "effect: objects[0].position_m[2]: \"a\" is not a number from -1000 to 1000");
+  EXPECT_EQ(Refusal({{"name", "x"}, {"objects", {{{"kind", "pendulum"}, {"pivot_m", {0, 1}}}}}}),
+            "effect: objects[0].pivot_m: [0,1] is not a list of 3 items");
+  EXPECT_EQ(Refusal({{"name", "x"}, {"objects", {{{"kind", "sphere"}, {"position_m", {0, 1, 0}}, {"motion", "flying"}}}}}),
+            "effect: objects[0].motion: \"flying\" is none of loose, fixed");
+  EXPECT_EQ(Refusal({{"name", "x"}, {"release", {{{"by", "height"}, {"start_s", 2}, {"end_s", 1}}}}}),
+            "effect: release[0].end_s: 1 is before start_s, 2");
+  EXPECT_EQ(Refusal({{"name", "x"}, {"objects", {{{"kind", "pendulum"}}, {{"kind", "pendulum"}}}}}),
+            "effect: objects[1].name: \"pendulum\" is another object's name already; give each its own");
+}
+
+TEST(Effect, TextThatIsNoJsonSaysWhere) {
+  const auto result = ParseEffect("{\"name\": \"x\",\n \"rate_hz\": }");
+  ASSERT_FALSE(result.ok());
+  EXPECT_EQ(result.status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(std::string(result.status().message()), HasSubstr("line 2"));
+  EXPECT_FALSE(ParseEffect("{\"name\": \"x\", \"rate_hz\": 1e999}").ok());
+  EXPECT_FALSE(ParseEffect("{\"name\": \"\xff\"}").ok());
+}
+
+TEST(Effect, UnknownNameListsWhatShips) {
+  const auto result = LoadEffect("pendulm");
+  ASSERT_FALSE(result.ok());
+  EXPECT_EQ(result.status().code(), absl::StatusCode::kNotFound);
+  EXPECT_THAT(std::string(result.status().message()), HasSubstr("calm, pendulum, release"));
+}
+
+TEST(Effect, FileErrorNamesTheFile) {
+  const std::filesystem::path path = std::filesystem::path(::testing::TempDir()) / "vorocast_effect_test.json";
+  std::ofstream(path) << R"({"name": "x", "rate_hz": 1})";
+  const auto result = LoadEffect(path.string());
+  ASSERT_FALSE(result.ok());
+  EXPECT_EQ(std::string(result.status().message()), path.string() + ": effect: rate_hz: 1 is not a number from 10 to 10000");
+  std::filesystem::remove(path);
+}
+
+/// Calls `visit` with every object schema that can be reached, as the value that holds just what it must and its place in the effect.
+using Place = std::function<json(const json& object)>;  // puts an object where it belongs in a whole effect
+const json& Resolve(const json& root, const json& schema) {
+  return schema.contains("$ref") ? root.at(json::json_pointer(schema["$ref"].get<std::string>().substr(1))) : schema;
+}
+void VisitObjects(const json& root, const json& schema_or_ref, const Place& place, const std::function<void(const json&, const Place&)>& visit) {
+  const json& schema = Resolve(root, schema_or_ref);
+  if (schema.contains("oneOf")) {
+    for (const json& alternative : schema["oneOf"]) VisitObjects(root, alternative, place, visit);
+  }
+  if (schema.value("type", "") == "array") {
+    VisitObjects(
+        root, schema["items"], [&](const json& item) { return place(json::array({item})); }, visit);
+  }
+  if (schema.value("type", "") != "object") return;
+  visit(schema, place);
+  for (const auto& [key, property] : schema["properties"].items()) {
+    VisitObjects(
+        root, property,
+        [&, name = key](const json& value) {
+          json object = json::object();
+          for (const auto& required : schema.value("required", json::array())) {
+            const json& needed = Resolve(root, schema["properties"][required.get<std::string>()]);
+            object[required.get<std::string>()] = needed.contains("const")              ? needed["const"]
+                                                  : needed.value("type", "") == "array" ? json({0, 0, 0})
+                                                                                        : json("x");
+          }
+          object[name] = value;
+          return place(object);
+        },
+        visit);
+  }
+}
+
+TEST(EffectSchema, EveryPropertyIsKnownToTheParserAndNothingElseIs) {
+  const json schema = json::parse(EffectSchemaText());
+  int objects = 0;
+  int properties = 0;
+  VisitObjects(
+      schema, schema, [](const json& whole) { return whole; },
+      [&](const json& object_schema, const Place& place) {
+        ++objects;
+        EXPECT_EQ(object_schema.value("additionalProperties", true), false) << object_schema;
+        json object = json::object();
+        for (const auto& [key, property_or_ref] : object_schema["properties"].items()) {
+          ++properties;
+          const json& property = Resolve(schema, property_or_ref);
+          const bool required = object_schema.contains("required") && object_schema["required"].dump().find('"' + key + '"') != std::string::npos;
+          EXPECT_NE(required, property.contains("default")) << key << ": a field is either required or has a default";
+          object[key] = property.contains("const")               ? property["const"]
+                        : property.contains("default")           ? property["default"]
+                        : property.value("type", "") == "string" ? json("x")
+                                                                 : json({0, 0, 0});
+        }
+        const auto known = NormaliseEffect(place(object));
+        EXPECT_TRUE(known.ok()) << known.status() << "\n" << place(object);
+        object["not_a_field"] = 1;
+        EXPECT_THAT(Refusal(place(object)), HasSubstr("not_a_field"));
+      });
+  EXPECT_EQ(objects, 9);  // effect, ground, recall, rupture, one release rule, cells, three objects
+  EXPECT_GT(properties, 50);
+}
+
+/// Reading is what fails (a CHECK) when the simulation forgets a field of the schema: here every field of it is read.
+TEST(EffectSchema, TheSimulationReadsEveryField) {
+  const json effect = {{"name", "all"},
+                       {"description", "d"},
+                       {"duration_s", 2},
+                       {"output_fps", 30},
+                       {"rate_hz", 100},
+                       {"gravity_m_s2", 1.5},
+                       {"ground", {{"enabled", false}, {"height_m", 0.25}, {"friction", 0.5}, {"restitution", 0.5}}},
+                       {"recall", {{"stiffness_s2", 1}, {"damping_ratio", 2}, {"angular_stiffness_s2", 3}, {"angular_damping_ratio", 4}}},
+                       {"rupture", {{"acceleration_m_s2", 7}}},
+                       {"release", {{{"by", "height"}, {"from", "bottom"}, {"start_s", 1}, {"end_s", 2}, {"share", 0.5}}}},
+                       {"cells", {{"density_kg_m3", 500}, {"friction", 0.1}, {"restitution", 0.2}, {"shrink_m", 0.001}}},
+                       {"objects",
+                        {{{"kind", "box"}, {"position_m", {1, 2, 3}}, {"rotation_deg", {10, 20, 30}}, {"origin", "world"}, {"motion", "fixed"}},
+                         {{"kind", "sphere"}, {"position_m", {1, 2, 3}}, {"velocity_m_s", {4, 5, 6}}, {"start_s", 0.5}, {"mass_kg", 9}},
+                         {{"kind", "pendulum"}, {"pivot_m", {1, 2, 3}}, {"heading_deg", 90}, {"motion", "loose"}}}}};
+  const auto read = EffectFromCanonicalJson(*NormaliseEffect(effect));
+  ASSERT_TRUE(read.ok()) << read.status();
+  EXPECT_EQ(read->duration_s, 2);
+  EXPECT_EQ(read->output_fps, 30);
+  EXPECT_EQ(read->ground.height_m, 0.25);
+  EXPECT_EQ(read->recall.angular_damping_ratio, 4);
+  EXPECT_EQ(read->rupture_acceleration_m_s2, 7);
+  EXPECT_FALSE(read->release[0].from_top);
+  EXPECT_EQ(read->cells.shrink_m, 0.001);
+  ASSERT_EQ(read->objects.size(), 3U);
+  EXPECT_TRUE(std::get<BoxSettings>(read->objects[0]).placement.fixed);
+  EXPECT_EQ(std::get<SphereSettings>(read->objects[1]).placement.velocity_m_s, geometry::Vec3(4, 5, 6));
+  EXPECT_EQ(*std::get<PendulumSettings>(read->objects[2]).pivot_m, geometry::Vec3(1, 2, 3));
+  EXPECT_FALSE(std::get<PendulumSettings>(read->objects[2]).driven);
+}
+
+TEST(EffectSchema, TheStructsDefaultsAreTheSchemas) {
+  const Effect defaults;
+  const Effect read = *EffectFromCanonicalJson(*NormaliseEffect({{"name", "x"}}));
+  EXPECT_EQ(read.rate_hz, defaults.rate_hz);
+  EXPECT_EQ(read.gravity_m_s2, defaults.gravity_m_s2);
+  EXPECT_EQ(read.recall.stiffness_s2, defaults.recall.stiffness_s2);
+  EXPECT_EQ(read.cells.shrink_m, defaults.cells.shrink_m);
+  EXPECT_EQ(read.cells.density_kg_m3, defaults.cells.density_kg_m3);
+  EXPECT_EQ(read.ground.surface.friction, defaults.ground.surface.friction);
+  EXPECT_EQ(read.cells.surface.restitution, defaults.cells.surface.restitution);
+}
+
+}  // namespace
+}  // namespace vorocast::simulation
