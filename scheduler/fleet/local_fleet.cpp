@@ -24,6 +24,9 @@ struct Recorded {
   std::vector<std::string> arguments;
 };
 
+/// Seconds after which a member whose scheduler was killed, and never started again, ends by itself.
+constexpr char kLeaveAfter[] = "60";
+
 std::map<std::string, Recorded> ReadFile(const std::filesystem::path& path) {
   std::map<std::string, Recorded> members;
   std::ifstream file(path);
@@ -44,9 +47,12 @@ std::map<std::string, Recorded> ReadFile(const std::filesystem::path& path) {
 std::vector<Member> Members(const LocalFleetPlan& plan) {
   std::vector<Member> members;
   for (std::int32_t i = 1; i <= plan.workers; ++i) {
-    members.push_back({fmt::format("worker-{}", i), {(plan.programs / "vorocast-worker").string(), "--scheduler", plan.scheduler, "--slots", "1"}});
+    members.push_back({fmt::format("worker-{}", i),
+                       {(plan.programs / "vorocast-worker").string(), "--scheduler", plan.scheduler, "--leave-after", kLeaveAfter, "--slots", "1"}});
   }
-  if (plan.simulation) members.push_back({"simulation", {(plan.programs / "vorocast-simulation").string(), "--scheduler", plan.scheduler}});
+  if (plan.simulation)
+    members.push_back(
+        {"simulation", {(plan.programs / "vorocast-simulation").string(), "--scheduler", plan.scheduler, "--leave-after", kLeaveAfter}});
   return members;
 }
 

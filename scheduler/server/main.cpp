@@ -18,6 +18,7 @@
 
 #include "scheduler/fleet/local_fleet.h"
 #include "scheduler/server/scheduler_server.h"
+#include "services/base/processor.h"
 
 namespace vorocast::server {
 namespace {
@@ -121,4 +122,7 @@ int Main(int argc, char** argv) {
 }  // namespace
 }  // namespace vorocast::server
 
-int main(int argc, char** argv) { return vorocast::server::Main(argc, argv); }
+int main(int argc, char** argv) {
+  vorocast::base::RequireProcessor();
+  return vorocast::server::Main(argc, argv);
+}

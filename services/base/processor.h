@@ -3,8 +3,8 @@
 
 namespace vorocast::base {
 
-/// False, with a message on standard error, when this processor lacks the instruction set the programs were built for
-/// (CMake's VOROCAST_MARCH). Called first in every main, where otherwise the first vector instruction would end the program.
-bool CheckProcessor();
+/// Ends the program with a message when this processor lacks the instruction set that it was built for (CMake's VOROCAST_MARCH), where
+/// otherwise the first vector instruction would end it without one. Called in every main; the check itself runs before main.
+void RequireProcessor();
 
 }  // namespace vorocast::base

@@ -26,7 +26,7 @@ std::vector<std::string> JoinAxis(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (!vorocast::base::CheckProcessor()) return 1;
+  vorocast::base::RequireProcessor();
   CLI::App program{"Vorocast turns captured performances into volumetric animation: Voronoi cells, tracked through a take, handed to physics."};
   program.name("vorocast");
   program.require_subcommand(1);

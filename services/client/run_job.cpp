@@ -72,7 +72,7 @@ absl::StatusOr<v1::Job> FollowJob(EmbeddedService& service, std::unique_ptr<Sche
 }
 
 void PrintResults(const v1::Job& job, const std::filesystem::path& out, double seconds) {
-  fmt::print("\n{} frames in {} at {}\n", job.sequence_name(), FormatDuration(seconds), out.string());
+  fmt::print("\nDone in {}. Results in {}:\n", FormatDuration(seconds), out.string());
   for (const v1::Output& output : job.outputs()) {
     if (!output.name().starts_with("cells/")) fmt::print("  {:<24} {:>8.1f} MB\n", output.name(), static_cast<double>(output.size()) / 1e6);
   }

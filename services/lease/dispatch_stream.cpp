@@ -14,6 +14,8 @@ DispatchStream::~DispatchStream() {
 }
 
 void DispatchStream::Run(const v1::Hello& hello) {
+  // The call is made the moment the scheduler is back; a failed call would only be tried again at the channel's next look, seconds later.
+  context_.set_wait_for_ready(true);
   call_ = stub_.Work(&context_);
   v1::WorkerMessage first;
   *first.mutable_hello() = hello;

@@ -76,6 +76,7 @@ class LeaseLoop {
   absl::Status Run() {
     const DrainSignals signals([this] { events_.Push(DrainRequested{}); });
     reconnect_.Set(absl::ZeroDuration());
+    NoteAway();
     heartbeat_.Set(options_.heartbeat);
     while (!IsOver()) {
       RunTimers();
@@ -89,12 +90,19 @@ class LeaseLoop {
  private:
   // Timers.
 
-  absl::Duration NextTimer() const { return std::min({reconnect_.left(), welcome_.left(), heartbeat_.left(), drain_.left(), farewell_.left()}); }
+  absl::Duration NextTimer() const {
+    return std::min({reconnect_.left(), welcome_.left(), away_.left(), heartbeat_.left(), drain_.left(), farewell_.left()});
+  }
 
   void RunTimers() {
     if (reconnect_.passed()) ConnectAgain();
     if (welcome_.passed()) EndStream("no welcome");
     if (heartbeat_.passed()) SendHeartbeat();
+    if (away_.passed()) {
+      away_.Clear();
+      Log(fmt::format("the scheduler has been away for {}", absl::FormatDuration(options_.leave_after)));
+      if (!draining_) Drain();
+    }
     if (drain_.passed()) {
       drain_.Clear();
       for (auto& [key, attempt] : running_) attempt->Stop();
@@ -118,7 +126,12 @@ class LeaseLoop {
     stream_ = std::make_unique<DispatchStream>(*stub_, ++stream_number_, std::move(hello), events_);
   }
 
+  void NoteAway() {
+    if (!away_.set() && options_.leave_after != absl::InfiniteDuration()) away_.Set(options_.leave_after);
+  }
+
   void EndStream(const std::string& why) {
+    NoteAway();
     if (welcomed_ || !lost_) Log(fmt::format("lost the scheduler at {}: {}; trying again until it is back", options_.scheduler, why));
     lost_ = true;
     welcomed_ = false;
@@ -156,6 +169,7 @@ class LeaseLoop {
   void OnWelcome(const v1::Welcome& welcome) {
     welcomed_ = true;
     welcome_.Clear();
+    away_.Clear();
     lost_ = false;
     backoff_ = kReconnectFirst;
     OpenStore(welcome.artifact_root());
@@ -255,8 +269,12 @@ class LeaseLoop {
     if (draining_) {
       // Asked again: stop now.
       drain_.Set(absl::ZeroDuration());
-      return;
+    } else {
+      Drain();
     }
+  }
+
+  void Drain() {
     draining_ = true;
     drain_.Set(options_.drain_time);
     farewell_.Set(options_.drain_time + kFarewellTime);
@@ -310,7 +328,7 @@ class LeaseLoop {
   bool lost_ = false;  // said so already
   bool draining_ = false;
   absl::Duration backoff_ = kReconnectFirst;
-  Deadline reconnect_, welcome_, heartbeat_, drain_, farewell_;
+  Deadline reconnect_, welcome_, away_, heartbeat_, drain_, farewell_;
 };
 
 absl::Status Validate(const LeaseLoopOptions& options) {

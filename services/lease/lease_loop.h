@@ -18,7 +18,8 @@ struct LeaseLoopOptions {
   std::filesystem::path program;  // run as `program execute-task` for each task
   std::string name;               // empty: host, pid, start time
   absl::Duration heartbeat = absl::Seconds(2);
-  absl::Duration drain_time = absl::Seconds(30);  // after SIGTERM, what still runs then is given back
+  absl::Duration leave_after = absl::InfiniteDuration();  // leaves by itself when the scheduler has been away so long
+  absl::Duration drain_time = absl::Seconds(30);          // after SIGTERM, what still runs then is given back
 };
 
 /// Takes leases until told to stop (SIGTERM or SIGINT drains), each task in a child process with its memory and time limits.

@@ -81,7 +81,7 @@ TEST(Kill, TheClientAndTheSameCommandGoesOn) {
   (void)job.Wait();
   const pid_t scheduler = SchedulerPid(run.state());
   EXPECT_TRUE(Eventually([&] { return !Alive(scheduler); }, 60)) << "the scheduler outlived the client that had started it";
-  const Outcome outcome = Run(RunArguments(run.folder));
+  const Outcome outcome = RunProgram(RunArguments(run.folder));
   EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
   ExpectUndisturbedResults(run);
 }
@@ -98,7 +98,7 @@ TEST(Kill, CtrlCStopsInGoodOrderAndTheSameCommandGoesOn) {
   EXPECT_THAT(stopped.output, testing::HasSubstr("the same command goes on from here"));
   EXPECT_FALSE(Alive(scheduler));
   EXPECT_FALSE(Alive(worker));
-  const Outcome outcome = Run(RunArguments(run.folder));
+  const Outcome outcome = RunProgram(RunArguments(run.folder));
   EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
   ExpectUndisturbedResults(run);
 }

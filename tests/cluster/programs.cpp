@@ -95,7 +95,7 @@ Outcome Running::Wait() {
   return outcome;
 }
 
-Outcome Run(const std::vector<std::string>& arguments) { return Running(arguments).Wait(); }
+Outcome RunProgram(const std::vector<std::string>& arguments) { return Running(arguments).Wait(); }
 
 bool Eventually(const std::function<bool()>& condition, double seconds) {
   const auto deadline = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);

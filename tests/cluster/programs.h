@@ -33,7 +33,7 @@ class Running {
   std::filesystem::path log_;
 };
 
-Outcome Run(const std::vector<std::string>& arguments);
+Outcome RunProgram(const std::vector<std::string>& arguments);
 
 /// Asks `condition` a hundred times a second for at most `seconds`; whether it came true.
 bool Eventually(const std::function<bool()>& condition, double seconds = 120);

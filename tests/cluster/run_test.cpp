@@ -16,17 +16,17 @@ using testing::IsSupersetOf;
 using testing::Key;
 using testing::Not;
 
-TEST(Run, LeavesEveryStagesResult) {
+TEST(RunCommand, LeavesEveryStagesResult) {
   EXPECT_THAT(UndisturbedDigests(),
               IsSupersetOf({Key("tracked.h5"), Key("simulated.h5"), Key("cells/frame_000000.h5"), Key("cells/frame_000011.h5"),
                             Key("sheets/points.png"), Key("sheets/cells.png"), Key("sheets/tracked.png"), Key("sheets/simulated.png")}));
 }
 
-TEST(Run, AnotherEffectComputesOnlyTheEffect) {
+TEST(RunCommand, AnotherEffectComputesOnlyTheEffect) {
   ASSERT_FALSE(UndisturbedDigests().empty());
   const std::filesystem::path folder = Scratch() / "undisturbed";
   const auto before = FinishedTasks(folder / "state");
-  const Outcome outcome = Run(RunArguments(folder, "release"));
+  const Outcome outcome = RunProgram(RunArguments(folder, "release"));
   EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
   std::vector<std::string> computed;
   for (const auto& [task, count] : FinishedTasks(folder / "state")) {
@@ -36,41 +36,41 @@ TEST(Run, AnotherEffectComputesOnlyTheEffect) {
   EXPECT_THAT(computed, testing::UnorderedElementsAre("release: simulate", "simulated: sheet"));
 }
 
-TEST(Run, ABadFrameCostsThatFrame) {
+TEST(RunCommand, ABadFrameCostsThatFrame) {
   const std::filesystem::path folder = Scratch() / "bad";
   std::filesystem::copy(SmallCapture(), folder / "capture", std::filesystem::copy_options::recursive);
   std::filesystem::resize_file(folder / "capture" / "frame_0005.ply", 5000);
   std::vector<std::string> arguments = RunArguments(folder);
   arguments[1] = (folder / "capture").string();
-  const Outcome outcome = Run(arguments);
+  const Outcome outcome = RunProgram(arguments);
   EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
   EXPECT_THAT(outcome.output, HasSubstr("frame 5"));
   EXPECT_THAT(Digests(folder / "out"), Not(testing::Contains(Key("cells/frame_000005.h5"))));
   EXPECT_THAT(Digests(folder / "out"), testing::Contains(Key("tracked.h5")));
 }
 
-TEST(Run, AWrongUnitIsToldBeforeAnythingIsComputed) {
+TEST(RunCommand, AWrongUnitIsToldBeforeAnythingIsComputed) {
   std::vector<std::string> arguments = RunArguments(Scratch() / "unit");
   arguments.insert(arguments.end(), {"--units", "parsec"});
-  const Outcome no_unit = Run(arguments);
+  const Outcome no_unit = RunProgram(arguments);
   EXPECT_EQ(no_unit.exit_code, 2);
   EXPECT_THAT(no_unit.output, HasSubstr("cm"));
   // Metres taken for millimetres make a person of 1.7 mm.
   arguments.back() = "mm";
-  const Outcome wrong_unit = Run(arguments);
+  const Outcome wrong_unit = RunProgram(arguments);
   EXPECT_EQ(wrong_unit.exit_code, 2);
   EXPECT_THAT(wrong_unit.output, HasSubstr("--units"));
   EXPECT_FALSE(std::filesystem::exists(Scratch() / "unit" / "state"));
 }
 
-TEST(Run, WrongWordsGetAnAnswer) {
-  const Outcome effect = Run(RunArguments(Scratch() / "words", "penduluum"));
+TEST(RunCommand, WrongWordsGetAnAnswer) {
+  const Outcome effect = RunProgram(RunArguments(Scratch() / "words", "penduluum"));
   EXPECT_EQ(effect.exit_code, 2);
   EXPECT_THAT(effect.output, HasSubstr("pendulum"));
-  const Outcome folder = Run({"run", (Scratch() / "nowhere").string()});
+  const Outcome folder = RunProgram({"run", (Scratch() / "nowhere").string()});
   EXPECT_EQ(folder.exit_code, 2);
   EXPECT_THAT(folder.output, HasSubstr("nowhere"));
-  const Outcome no_scheduler = Run({"status", "--state", (Scratch() / "nothing").string()});
+  const Outcome no_scheduler = RunProgram({"status", "--state", (Scratch() / "nothing").string()});
   EXPECT_EQ(no_scheduler.exit_code, 2);
   EXPECT_THAT(no_scheduler.output, HasSubstr("vorocast serve"));
 }

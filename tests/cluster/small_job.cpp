@@ -10,7 +10,7 @@ namespace vorocast::cluster {
 const std::filesystem::path& SmallCapture() {
   static const std::filesystem::path folder = [] {
     const std::filesystem::path made = Scratch() / "capture";
-    const Outcome outcome = Run({"synth", made.string(), "--count", "12", "--points", "15000"});
+    const Outcome outcome = RunProgram({"synth", made.string(), "--count", "12", "--points", "15000"});
     EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
     return made;
   }();
@@ -31,7 +31,7 @@ std::vector<std::string> RunArguments(const std::filesystem::path& folder, const
 const std::map<std::string, std::string>& UndisturbedDigests() {
   static const std::map<std::string, std::string> digests = [] {
     const std::filesystem::path folder = Scratch() / "undisturbed";
-    const Outcome outcome = Run(RunArguments(folder));
+    const Outcome outcome = RunProgram(RunArguments(folder));
     EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
     return Digests(folder / "out");
   }();

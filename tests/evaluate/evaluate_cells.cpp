@@ -76,7 +76,7 @@ absl::Status Evaluate(const char* path) {
   const double n = static_cast<double>(cells.size());
   const double g3 = score.energy / (3 * n * std::pow(score.volume / n, 5.0 / 3));
 
-  const Tree tree(surface.begin(), surface.end());
+  Tree tree(surface.begin(), surface.end());
   tree.accelerate_distance_queries();
   for (const Vec3& p : cells.surface.positions) {
     const double distance = std::sqrt(tree.squared_distance(Kernel::Point_3(p.x(), p.y(), p.z())));
