@@ -21,6 +21,14 @@ pkg_check_modules(BULLET REQUIRED IMPORTED_TARGET bullet)
 pkg_check_modules(SQLITE REQUIRED IMPORTED_TARGET sqlite3)
 find_library(TETGEN_LIBRARY tet REQUIRED)
 
+# CGAL asks for -frounding-math wherever it is linked, which slows the kernels beside it: only the sources that include CGAL need it
+# (vorocast_uses_cgal()).
+get_target_property(cgal_target CGAL::CGAL ALIASED_TARGET)
+set_target_properties(${cgal_target} PROPERTIES INTERFACE_COMPILE_OPTIONS "")
+function(vorocast_uses_cgal)
+  set_property(SOURCE ${ARGN} APPEND PROPERTY COMPILE_OPTIONS -frounding-math)
+endfunction()
+
 # Packages without a target of their own.
 add_library(hdf5_c INTERFACE IMPORTED)
 target_include_directories(hdf5_c INTERFACE ${HDF5_C_INCLUDE_DIRS})

@@ -145,6 +145,7 @@ absl::StatusOr<Effect> EffectFromCanonicalJson(const json& json_effect) {
   Effect effect{.name = fields.Get<std::string>("name"),
                 .description = fields.Get<std::string>("description"),
                 .duration_s = fields.NumberOrWord("duration_s"),
+                .duration_min_s = fields.Get<double>("duration_min_s"),
                 .output_fps = fields.NumberOrWord("output_fps"),
                 .rate_hz = fields.Get<double>("rate_hz"),
                 .gravity_m_s2 = fields.Get<double>("gravity_m_s2"),

@@ -90,6 +90,7 @@ struct Effect {
   std::string name;
   std::string description;
   std::optional<double> duration_s;
+  double duration_min_s = 0;
   std::optional<double> output_fps;
   double rate_hz = 240;
   double gravity_m_s2 = 9.81;

@@ -40,7 +40,8 @@ absl::StatusOr<geometry::SimulatedTake> Simulate(const geometry::TrackedTake& ta
 
   const double fps = effect.output_fps.value_or(take.frames_per_second);
   const double frame_time = 1 / fps;
-  const double instants = std::floor(effect.duration_s.value_or(motion.duration_s()) * fps + 1e-6) + 1;
+  const double duration = std::max(effect.duration_s.value_or(motion.duration_s()), effect.duration_min_s);
+  const double instants = std::floor(duration * fps + 1e-6) + 1;
   if (instants > kInstantsMax) {
     return absl::InvalidArgumentError(fmt::format("effect: duration_s: {} stored frames; at most {} can be stored", instants, kInstantsMax));
   }

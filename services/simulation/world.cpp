@@ -5,6 +5,7 @@
 #include <btBulletDynamicsCommon.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "services/base/check.h"
@@ -107,19 +108,25 @@ struct World::Bodies {
   std::vector<ObjectBody> objects;
   btVector3 gravity{0, 0, 0};
 
-  /// A few iterations cannot carry a heap on a light cell: what the contacts left below the ground is put back on it.
-  void LiftOutOfGround() {
-    constexpr float kSlop = 0.1F;  // Bullet units that contacts may work with
+  /// What Bullet's contacts leave undone for cells on the ground. A few iterations cannot carry a heap on a light cell: what is left below
+  /// the ground is put back on it. And lumps are not balls: their corners take the turning out of them, or they would roll away for ever.
+  void SettleOnGround(double dt) {
+    constexpr float kSlop = 0.1F;          // Bullet units that contacts may work with
+    constexpr double kRollingDecay = 6.0;  // 1/s
+    const auto kept_turning = static_cast<float>(std::exp(-kRollingDecay * dt));
     const float ground_height = ground_shape->getPlaneConstant();
     for (CellBody& cell : cells) {
       if (!cell.inside || !cell.released || !cell.body->isActive()) continue;
       const btTransform& pose = cell.body->getWorldTransform();
-      if (pose.getOrigin().y() - cell.shape->radius > ground_height - kSlop) continue;
+      if (pose.getOrigin().y() - cell.shape->radius > ground_height + kSlop) continue;
       float lowest = std::numeric_limits<float>::max();
       const btVector3& up = pose.getBasis()[1];
       for (const Eigen::Vector3f& corner : cell.shape->all_corners)
         lowest = std::min(lowest, up.x() * corner.x() + up.y() * corner.y() + up.z() * corner.z());
-      const float lift = ground_height - kSlop - (pose.getOrigin().y() + lowest);
+      const float above = pose.getOrigin().y() + lowest - ground_height;
+      if (above > kSlop) continue;
+      cell.body->setAngularVelocity(kept_turning * cell.body->getAngularVelocity());
+      const float lift = -kSlop - above;
       if (lift <= 0) continue;
       btTransform lifted = pose;
       lifted.getOrigin().setY(pose.getOrigin().y() + lift);
@@ -288,7 +295,7 @@ geometry::Box3 World::ObjectBounds(std::size_t index) const {
 
 void World::Step(double dt) {
   bodies_->world.stepSimulation(static_cast<float>(dt), 0);
-  if (bodies_->ground) bodies_->LiftOutOfGround();
+  if (bodies_->ground) bodies_->SettleOnGround(dt);
 }
 
 }  // namespace vorocast::simulation

@@ -38,6 +38,7 @@ TEST(RunCommand, AnotherEffectComputesOnlyTheEffect) {
 
 TEST(RunCommand, ABadFrameCostsThatFrame) {
   const std::filesystem::path folder = Scratch() / "bad";
+  std::filesystem::create_directories(folder);
   std::filesystem::copy(SmallCapture(), folder / "capture", std::filesystem::copy_options::recursive);
   std::filesystem::resize_file(folder / "capture" / "frame_0005.ply", 5000);
   std::vector<std::string> arguments = RunArguments(folder);

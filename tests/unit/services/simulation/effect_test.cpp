@@ -189,6 +189,7 @@ TEST(EffectSchema, TheSimulationReadsEveryField) {
   const json effect = {{"name", "all"},
                        {"description", "d"},
                        {"duration_s", 2},
+                       {"duration_min_s", 3},
                        {"output_fps", 30},
                        {"rate_hz", 100},
                        {"gravity_m_s2", 1.5},
@@ -204,6 +205,7 @@ TEST(EffectSchema, TheSimulationReadsEveryField) {
   const auto read = EffectFromCanonicalJson(*NormaliseEffect(effect));
   ASSERT_TRUE(read.ok()) << read.status();
   EXPECT_EQ(read->duration_s, 2);
+  EXPECT_EQ(read->duration_min_s, 3);
   EXPECT_EQ(read->output_fps, 30);
   EXPECT_EQ(read->ground.height_m, 0.25);
   EXPECT_EQ(read->recall.angular_damping_ratio, 4);
