@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <iterator>
 #include <set>
 
 #include "services/simulation/effect_settings.h"
@@ -217,6 +218,31 @@ TEST(EffectSchema, TheSimulationReadsEveryField) {
   EXPECT_EQ(std::get<SphereSettings>(read->objects[1]).placement.velocity_m_s, geometry::Vec3(4, 5, 6));
   EXPECT_EQ(*std::get<PendulumSettings>(read->objects[2]).pivot_m, geometry::Vec3(1, 2, 3));
   EXPECT_FALSE(std::get<PendulumSettings>(read->objects[2]).driven);
+}
+
+std::string Text(const std::filesystem::path& path) {
+  std::ifstream file(path);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+TEST(EffectDocs, TellOfEveryFieldAndTheirExamplesAreRight) {
+  const std::string text = Text(std::filesystem::path(VOROCAST_SOURCE_DIR) / "docs" / "effects.md");
+  const json schema = json::parse(EffectSchemaText());
+  VisitObjects(
+      schema, schema, [](const json& whole) { return whole; },
+      [&](const json& object_schema, const Place&) {
+        for (const auto& [key, property] : object_schema["properties"].items()) {
+          if (key == "kind") continue;
+          EXPECT_THAT(text, HasSubstr("`" + key + "`"));
+        }
+      });
+  int examples = 0;
+  for (std::size_t at = text.find("```json"); at != std::string::npos; at = text.find("```json", at + 1)) {
+    const auto effect = ParseEffect(text.substr(at + 7, text.find("```", at + 7) - at - 7));
+    EXPECT_TRUE(effect.ok()) << effect.status();
+    ++examples;
+  }
+  EXPECT_EQ(examples, 4);
 }
 
 TEST(EffectSchema, TheStructsDefaultsAreTheSchemas) {
