@@ -11,7 +11,7 @@ help:
 	@echo "make build    install what is missing, build; the programs are in $(BUILD)/bin"
 	@echo "make demo     build, then make up a capture, track it, simulate an effect and show where the pictures are"
 	@echo "make test     build everything and run the tests (PRESET=asan or PRESET=tsan: under sanitizers)"
-	@echo "make bench    build and run the benchmarks; results also in $(BUILD)/bench.json"
+	@echo "make bench    build and run the benchmarks; each prints time and quality beside its goal"
 	@echo "make check    formatting, layers and clang-tidy"
 	@echo "make format   format the sources"
 	@echo "make clean    remove $(BUILD)"
