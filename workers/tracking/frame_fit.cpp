@@ -15,11 +15,10 @@ using geometry::Vec3f;
 constexpr float kAlongSurface = 0.15F;
 // A point this many σ from its best partner is as likely an outlier as not.
 constexpr double kOutlierSigmas = 2.5;
-// A little point-to-point keeps patches on flat or cylindrical parts from sliding.
-constexpr double kSurfacePointWeight = 0.02;
-constexpr double kInnerWeight = 0.3;
-// Regulariser mass a surface point at weight 1: 5000 cells with 8 neighbouring patches against 65k points, at which the default weight was found.
-constexpr double kRegulariserBalance = 0.6;
+// Inner points hold the volume together, but cells of two frames never correspond: much more weight and they hold it back.
+constexpr double kInnerWeight = 0.03;
+// Mass of the regulariser for each surface point, whatever the number of points, cells and patches; 0.3 of it is best on captures with known motion.
+constexpr double kRegulariserBalance = 0.2;
 constexpr double kDamping = 1e-4;
 
 /// The weights α of up to 3 partners: soft assignment over the candidates and an outlier class (paper, section 4.3).
@@ -56,7 +55,7 @@ void FrameFit::Partners::Offer(float score, const PosedPoint& point) {
   }
 }
 
-void FrameFit::PoseSurface(const Pose& pose, double cell_m) {
+void FrameFit::PoseSurface(const Pose& pose, const FitStage& stage) {
   origin_ = pose[0] * model_.centre[0];
   std::vector<Eigen::Matrix3f> rotation;
   std::vector<Vec3> offset;
@@ -65,11 +64,11 @@ void FrameFit::PoseSurface(const Pose& pose, double cell_m) {
     centre_[k] = (pose[k] * model_.centre[k] - origin_).cast<float>();
   }
   posed_.clear();
-  for (const SurfaceSample& sample : model_.surface) {
+  for (const SurfaceSample& sample : stage.coarse ? model_.surface_coarse : model_.surface) {
     const Vec3f arm = (sample.position - model_.centre[sample.patch]).cast<float>();
     posed_.push_back({centre_[sample.patch] + rotation[sample.patch] * arm, rotation[sample.patch] * sample.normal.cast<float>(), 0, sample.patch});
   }
-  surface_.Build(posed_, static_cast<float>(cell_m));
+  surface_.Build(posed_, static_cast<float>(stage.reach_m));
 }
 
 void FrameFit::PoseInner(const Pose& pose, double cell_m) {
@@ -111,7 +110,6 @@ void FrameFit::AssociateSurface(const ObservedFrame& frame, const FitStage& stag
       // The normal halfway between both is exact on spheres and cylinders, where either tangent plane alone is off by offset² / 2 radius.
       const Vec3 between = (normal + point.normal).cast<double>().normalized();
       surface_data_[point.patch].AddPointToPlane(arm, between, delta, alpha[c]);
-      surface_data_[point.patch].AddPointToPoint(arm, delta, kSurfacePointWeight * alpha[c]);
     }
   }
 }
@@ -119,7 +117,7 @@ void FrameFit::AssociateSurface(const ObservedFrame& frame, const FitStage& stag
 void FrameFit::AssociateInner(const ObservedFrame& frame, const FitStage& stage) {
   const double reach = 1.5 * model_.cell_spacing_m;
   const double sigma = std::max(stage.sigma_m, 0.5 * model_.cell_spacing_m);
-  for (std::size_t i = 0; i < frame.inner.size(); ++i) {
+  for (std::size_t i = stage.phase % stage.inner_stride; i < frame.inner.size(); i += stage.inner_stride) {
     const Vec3f x = (frame.inner[i] - origin_).cast<float>();
     const auto depth = static_cast<float>(frame.inner_depth[i]);
     Partners partners;
@@ -141,7 +139,7 @@ void FrameFit::AssociateInner(const ObservedFrame& frame, const FitStage& stage)
 void FrameFit::Step(const ObservedFrame& frame, const FitStage& stage, const std::vector<Relation>& reference, Pose& pose) {
   for (DataBlock& block : surface_data_) block.Clear();
   for (DataBlock& block : inner_data_) block.Clear();
-  PoseSurface(pose, stage.reach_m);
+  PoseSurface(pose, stage);
   AssociateSurface(frame, stage);
   if (!frame.inner.empty()) {
     PoseInner(pose, 1.5 * model_.cell_spacing_m);
@@ -151,7 +149,7 @@ void FrameFit::Step(const ObservedFrame& frame, const FitStage& stage, const std
   equations_.Clear();
   for (std::int32_t k = 0; k < model_.patch_count; ++k) {
     surface_data_[k].AddTo(equations_.Diagonal(k), equations_.Gradient(k), static_cast<double>(stage.stride));
-    inner_data_[k].AddTo(equations_.Diagonal(k), equations_.Gradient(k), kInnerWeight);
+    inner_data_[k].AddTo(equations_.Diagonal(k), equations_.Gradient(k), kInnerWeight * static_cast<double>(stage.inner_stride));
   }
   const double points = std::max<double>(static_cast<double>(frame.position.size()), 1);
   const double mass = std::max(model_.edge_mass, 1.0);
@@ -161,7 +159,7 @@ void FrameFit::Step(const ObservedFrame& frame, const FitStage& stage, const std
 }
 
 FitQuality FrameFit::Measure(const ObservedFrame& frame, const FitStage& stage, const Pose& pose) {
-  PoseSurface(pose, stage.reach_m);
+  PoseSurface(pose, stage);
   const double limit = 4 * stage.sigma_m * stage.sigma_m;
   std::size_t seen = 0;
   std::size_t found = 0;

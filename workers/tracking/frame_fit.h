@@ -13,12 +13,14 @@ namespace vorocast::tracking {
 
 /// How one iteration associates and weighs.
 struct FitStage {
+  bool coarse = false;      // associate with the coarse surface samples
   double sigma_m = 0.005;   // of the soft association
   double reach_m = 0.015;   // no partner is looked for beyond this
   double cosine_min = 0.7;  // compatibility of surface points (paper, section 4.3: θmax)
   double depth_tolerance_m = 0.015;
   double regulariser = 0.3;
   std::size_t stride = 1;  // every stride-th surface point is used, beginning at `phase`
+  std::size_t inner_stride = 4;
   std::size_t phase = 0;
 };
 
@@ -54,7 +56,7 @@ class FrameFit {
     void Offer(float score, const PosedPoint& point);
   };
 
-  void PoseSurface(const Pose& pose, double cell_m);
+  void PoseSurface(const Pose& pose, const FitStage& stage);
   void PoseInner(const Pose& pose, double cell_m);
   Partners SurfacePartners(const geometry::Vec3f& x, const geometry::Vec3f& normal, const FitStage& stage) const;
   void AssociateSurface(const ObservedFrame& frame, const FitStage& stage);

@@ -14,20 +14,22 @@ namespace {
 using geometry::FrameState;
 using geometry::PoseTrack;
 
-constexpr double kSampleSpacingM = 0.020;
-constexpr double kSigmaStartM = 0.040;
+constexpr double kSigmaStartM = 0.030;
 constexpr double kSigmaEndM = 0.012;
 constexpr double kRegulariser = 0.3;
+constexpr double kFromLastFrame = 0.8;
 constexpr std::size_t kPointsCompared = 1500;
 
 FitStage StageOf(const GuideOptions& options, std::int32_t iteration, std::size_t points) {
   const double progress = options.iterations > 1 ? static_cast<double>(iteration) / (options.iterations - 1) : 1.0;
   FitStage stage;
+  stage.coarse = true;
   stage.sigma_m = kSigmaStartM * std::pow(kSigmaEndM / kSigmaStartM, progress);
   stage.reach_m = 2 * stage.sigma_m;
   stage.cosine_min = 0.5;
   stage.regulariser = kRegulariser;
-  stage.stride = std::max<std::size_t>(1, points / static_cast<std::size_t>(options.points));
+  stage.stride =
+      std::max<std::size_t>(1, points / static_cast<std::size_t>(2 * iteration < options.iterations ? options.points / 3 : options.points));
   stage.phase = static_cast<std::size_t>(iteration) % stage.stride;
   return stage;
 }
@@ -63,12 +65,12 @@ class Follower {
     return fit_.Measure(observed, stage, moved).squared_mean < still ? moved : now_;
   }
 
-  /// Neighbouring patches should lie as in the template and as in the last frame, in equal parts.
+  /// Neighbouring patches should lie nearly as in the last frame, drawn a little towards the template, lest errors add up.
   std::vector<Relation> Reference() const {
     std::vector<Relation> reference = RelationsOf(model_, now_);
     for (Relation& relation : reference) {
-      relation.matrix = 0.5 * (relation.matrix + geometry::Mat3::Identity());
-      relation.offset *= 0.5;
+      relation.matrix = kFromLastFrame * relation.matrix + (1 - kFromLastFrame) * geometry::Mat3::Identity();
+      relation.offset *= kFromLastFrame;
     }
     return reference;
   }
@@ -150,7 +152,7 @@ absl::StatusOr<PoseTrack> Guide(const geometry::Template& model, const std::vect
                                 const base::Progress& progress) {
   RETURN_IF_ERROR(base::Annotate(ValidateTemplate(model), "guide"));
   RETURN_IF_ERROR(base::Annotate(ValidateGuide(frames, options), "guide"));
-  const PatchModel patches = BuildPatchModel(model.cells, model.patch, model.patch_count, kSampleSpacingM);
+  const PatchModel patches = BuildPatchModel(model.cells, model.patch, model.patch_count);
   auto track = GuidePass(patches, frames, options, progress).Run(model.frame);
   if (!track.ok()) return base::Annotate(track.status(), "guide");
   return track;

@@ -51,40 +51,22 @@ void DataBlock::AddTo(Matrix6& h, Vector6& g, double scale) const {
   g += scale * gradient_;
 }
 
+namespace {
+
+std::vector<std::array<std::int32_t, 2>> PairsOf(const std::vector<PatchEdge>& edges) {
+  std::vector<std::array<std::int32_t, 2>> pairs;
+  for (const PatchEdge& edge : edges) pairs.push_back({edge.k, edge.l});
+  return pairs;
+}
+
+}  // namespace
+
 NormalEquations::NormalEquations(const PatchModel& model)
     : model_(model),
       diagonal_(static_cast<std::size_t>(model.patch_count)),
       lower_(model.edges.size()),
-      gradient_(static_cast<std::size_t>(model.patch_count)) {
-  const int size = 6 * model.patch_count;
-  std::vector<Eigen::Triplet<double>> entries;
-  for (std::int32_t k = 0; k < model.patch_count; ++k) {
-    for (int j = 0; j < 6; ++j) {
-      for (int i = j; i < 6; ++i) entries.emplace_back(6 * k + i, 6 * k + j, i == j ? 1.0 : 0.0);
-    }
-  }
-  for (const PatchEdge& edge : model.edges) {
-    for (int j = 0; j < 6; ++j) {
-      for (int i = 0; i < 6; ++i) entries.emplace_back(6 * edge.l + i, 6 * edge.k + j, 0.0);
-    }
-  }
-  matrix_.resize(size, size);
-  matrix_.setFromTriplets(entries.begin(), entries.end());
-  matrix_.makeCompressed();
-  const auto find = [&](int row, int column) {
-    const int* begin = matrix_.innerIndexPtr() + matrix_.outerIndexPtr()[column];
-    const int* end = matrix_.innerIndexPtr() + matrix_.outerIndexPtr()[column + 1];
-    return static_cast<std::int32_t>(std::lower_bound(begin, end, row) - matrix_.innerIndexPtr());
-  };
-  for (std::int32_t k = 0; k < model.patch_count; ++k) {
-    value_of_diagonal_.emplace_back();
-    for (int j = 0; j < 6; ++j) value_of_diagonal_.back().push_back(find(6 * k + j, 6 * k + j));
-  }
-  for (const PatchEdge& edge : model.edges) {
-    value_of_lower_.emplace_back();
-    for (int j = 0; j < 6; ++j) value_of_lower_.back().push_back(find(6 * edge.l, 6 * edge.k + j));
-  }
-  cholesky_.analyzePattern(matrix_);
+      gradient_(static_cast<std::size_t>(model.patch_count)),
+      cholesky_(model.patch_count, PairsOf(model.edges)) {
   Clear();
 }
 
@@ -100,29 +82,20 @@ bool NormalEquations::Solve(double damping, std::vector<Vector6>& twists) {
   // Turning and moving have different units, so each has its own scale; the floor keeps a system without any data or edges regular.
   const double turn = std::max(scale.head<3>().sum() / (3.0 * model_.patch_count), 1e-12);
   const double move = std::max(scale.tail<3>().sum() / (3.0 * model_.patch_count), 1e-9);
-  double* values = matrix_.valuePtr();
+  cholesky_.Clear();
+  twists.resize(static_cast<std::size_t>(model_.patch_count));
   for (std::int32_t k = 0; k < model_.patch_count; ++k) {
-    for (int j = 0; j < 6; ++j) {
-      double* column = values + value_of_diagonal_[k][j];
-      for (int i = j; i < 6; ++i) column[i - j] = diagonal_[k](i, j);
-      column[0] += damping * (j < 3 ? turn : move);
-    }
+    Matrix6& block = cholesky_.Diagonal(k);
+    block = diagonal_[k];
+    for (int i = 0; i < 6; ++i) block(i, i) += damping * (i < 3 ? turn : move);
+    twists[k] = -gradient_[k];
   }
-  for (std::size_t e = 0; e < lower_.size(); ++e) {
-    for (int j = 0; j < 6; ++j) {
-      double* column = values + value_of_lower_[e][j];
-      for (int i = 0; i < 6; ++i) column[i] = lower_[e](i, j);
-    }
-  }
-  twists.assign(static_cast<std::size_t>(model_.patch_count), Vector6::Zero());
-  cholesky_.factorize(matrix_);
-  if (cholesky_.info() != Eigen::Success) return false;
-  Eigen::VectorXd right(6 * model_.patch_count);
-  for (std::int32_t k = 0; k < model_.patch_count; ++k) right.segment<6>(6 * k) = -gradient_[k];
-  const Eigen::VectorXd solution = cholesky_.solve(right);
-  if (!solution.allFinite()) return false;
-  for (std::int32_t k = 0; k < model_.patch_count; ++k) twists[k] = solution.segment<6>(6 * k);
-  return true;
+  for (std::size_t e = 0; e < lower_.size(); ++e) cholesky_.SetLower(e, lower_[e]);
+  bool solved = cholesky_.Factorise();
+  if (solved) cholesky_.Solve(twists);
+  for (const Vector6& twist : twists) solved = solved && twist.allFinite();
+  if (!solved) std::ranges::fill(twists, Vector6::Zero());
+  return solved;
 }
 
 void ApplyTwists(const PatchModel& model, const std::vector<Vector6>& twists, Pose& pose) {

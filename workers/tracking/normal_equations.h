@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
-#include <Eigen/Dense>
-#include <Eigen/SparseCholesky>
 #include <cstdint>
 #include <vector>
 
+#include "workers/tracking/block_cholesky.h"
 #include "workers/tracking/patch_model.h"
 
 // Gauss–Newton on SE(3), one twist a patch. Legend:
@@ -15,9 +14,6 @@
 //   r           residual; H = Σ w Jᵀ J, g = Σ w Jᵀ r, energy Σ w r², step ξ = −H⁻¹ g
 
 namespace vorocast::tracking {
-
-using Matrix6 = Eigen::Matrix<double, 6, 6>;
-using Vector6 = Eigen::Matrix<double, 6, 1>;
 
 inline geometry::Mat3 Cross(const geometry::Vec3& a) {
   geometry::Mat3 m;
@@ -69,10 +65,7 @@ class NormalEquations {
   std::vector<Matrix6> diagonal_;
   std::vector<Matrix6> lower_;
   std::vector<Vector6> gradient_;
-  Eigen::SparseMatrix<double> matrix_;                        // lower triangle
-  std::vector<std::vector<std::int32_t>> value_of_lower_;     // [edges][6] where each column of an edge's block starts among the stored values
-  std::vector<std::vector<std::int32_t>> value_of_diagonal_;  // [patches][6]
-  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Lower> cholesky_;
+  BlockCholesky cholesky_;
 };
 
 /// Moves each patch by its twist, about its posed centre; rotations stay unit.

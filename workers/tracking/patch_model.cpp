@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "workers/tracking/surface_samples.h"
@@ -15,7 +16,10 @@ namespace {
 using geometry::Mat3;
 using geometry::Vec3;
 
-/// Mass, first and second moment of a patch about its centre.
+constexpr double kFineSpacingM = 0.010;
+constexpr double kCoarseSpacingM = 0.020;
+
+/// Mass and second moment of a patch about its centre.
 struct PatchMoments {
   double mass = 0;
   Mat3 covariance = Mat3::Zero();
@@ -34,6 +38,59 @@ std::vector<PatchMoments> MomentsOfPatches(const geometry::Cells& cells, const s
     m.mass += mass;
   }
   return moments;
+}
+
+/// Adds the edge (k, l) with its cells counted `share` times.
+void AddEdge(std::int32_t k, std::int32_t l, double share, const std::vector<PatchMoments>& moments, PatchModel& model) {
+  PatchEdge edge{k, l, moments[k].mass + moments[l].mass, Vec3::Zero(), Mat3::Zero()};
+  edge.mean = (moments[k].mass * model.centre[k] + moments[l].mass * model.centre[l]) / edge.mass;
+  for (const std::int32_t side : {k, l}) {
+    const Vec3 arm = model.centre[side] - edge.mean;
+    edge.covariance += moments[side].covariance + moments[side].mass * arm * arm.transpose();
+  }
+  edge.mass *= share;
+  edge.covariance *= share;
+  model.edge_mass += edge.mass;
+  model.edges.push_back(edge);
+}
+
+/// Labels patches that edges connect, directly or not, with the lowest patch among them.
+std::vector<std::int32_t> ConnectedPatches(const PatchModel& model) {
+  std::vector<std::int32_t> label(static_cast<std::size_t>(model.patch_count));
+  std::iota(label.begin(), label.end(), 0);
+  for (bool changed = true; changed;) {
+    changed = false;
+    for (const PatchEdge& edge : model.edges) {
+      const std::int32_t lowest = std::min(label[edge.k], label[edge.l]);
+      changed |= label[edge.k] != label[edge.l];
+      label[edge.k] = label[edge.l] = lowest;
+    }
+  }
+  return label;
+}
+
+/// Ties each group of connected patches weakly to the nearest patch of another: a fragment that no point tells of then goes with what is beside it
+/// instead of anywhere, while a component that is seen hardly feels it.
+void AddTethers(const std::vector<PatchMoments>& moments, PatchModel& model) {
+  constexpr double kShare = 0.01;
+  const std::vector<std::int32_t> label = ConnectedPatches(model);
+  std::vector<std::array<std::int32_t, 2>> tethers;
+  for (std::int32_t group = 0; group < model.patch_count; ++group) {
+    std::array<std::int32_t, 2> nearest{-1, -1};
+    double least = std::numeric_limits<double>::infinity();
+    for (std::int32_t k = group; k < model.patch_count && label[group] == group; ++k) {
+      if (label[k] != group) continue;
+      for (std::int32_t l = 0; l < model.patch_count; ++l) {
+        const double squared = (model.centre[k] - model.centre[l]).squaredNorm();
+        if (label[l] != group && squared < least) least = squared, nearest = {std::min(k, l), std::max(k, l)};
+      }
+    }
+    if (nearest[0] >= 0) tethers.push_back(nearest);
+  }
+  std::ranges::sort(tethers);
+  const auto repeated = std::ranges::unique(tethers);
+  tethers.erase(repeated.begin(), repeated.end());
+  for (const auto& [k, l] : tethers) AddEdge(k, l, kShare, moments, model);
 }
 
 }  // namespace
@@ -63,22 +120,15 @@ std::vector<Vec3> PatchCentres(const geometry::Cells& cells, const std::vector<s
   return centre;
 }
 
-PatchModel BuildPatchModel(const geometry::Cells& cells, const std::vector<std::int32_t>& patch, std::int32_t patch_count, double spacing_m) {
+PatchModel BuildPatchModel(const geometry::Cells& cells, const std::vector<std::int32_t>& patch, std::int32_t patch_count) {
   PatchModel model;
   model.patch_count = patch_count;
   model.centre = PatchCentres(cells, patch, patch_count);
   const std::vector<PatchMoments> moments = MomentsOfPatches(cells, patch, model.centre);
-  for (const auto& [k, l] : PatchPairs(cells, patch)) {
-    PatchEdge edge{k, l, moments[k].mass + moments[l].mass, Vec3::Zero(), Mat3::Zero()};
-    edge.mean = (moments[k].mass * model.centre[k] + moments[l].mass * model.centre[l]) / edge.mass;
-    for (const std::int32_t side : {k, l}) {
-      const Vec3 arm = model.centre[side] - edge.mean;
-      edge.covariance += moments[side].covariance + moments[side].mass * arm * arm.transpose();
-    }
-    model.edge_mass += edge.mass;
-    model.edges.push_back(edge);
-  }
-  model.surface = SampleTemplateSurface(cells, patch, spacing_m);
+  for (const auto& [k, l] : PatchPairs(cells, patch)) AddEdge(k, l, 1, moments, model);
+  AddTethers(moments, model);
+  model.surface = SampleTemplateSurface(cells, patch, kFineSpacingM);
+  model.surface_coarse = SampleTemplateSurface(cells, patch, kCoarseSpacingM);
   for (std::size_t c = 0; c < cells.size(); ++c) model.inner.push_back({cells.centroid[c], cells.depth[c], patch[c]});
   const double volume = std::accumulate(cells.volume.begin(), cells.volume.end(), 0.0);
   // Neighbours in the densest lattice of this cell volume are 1.12 V^(1/3) apart.

@@ -39,16 +39,16 @@ struct PatchEdge {
 /// A template made ready for tracking: what does not change from frame to frame.
 struct PatchModel {
   std::int32_t patch_count = 0;
-  std::vector<geometry::Vec3> centre;  // [patches] centroid of each patch
-  std::vector<PatchEdge> edges;        // sorted by (k, l)
-  double edge_mass = 0;                // Σ mass over the edges
-  std::vector<SurfaceSample> surface;
-  std::vector<InnerSample> inner;  // [n] one a cell
-  double cell_spacing_m = 0;       // distance between neighbouring centroids, about
+  std::vector<geometry::Vec3> centre;         // [patches] centroid of each patch
+  std::vector<PatchEdge> edges;               // sorted by (k, l); then weak ones that tie what is not connected
+  double edge_mass = 0;                       // Σ mass over the edges
+  std::vector<SurfaceSample> surface;         // 10 mm apart
+  std::vector<SurfaceSample> surface_coarse;  // 20 mm apart, for wide associations: a quarter of the candidates
+  std::vector<InnerSample> inner;             // [n] one a cell
+  double cell_spacing_m = 0;                  // distance between neighbouring centroids, about
 };
 
-/// `patch` and `patch_count` may be coarser than the template's own; surface samples are about `spacing_m` apart.
-PatchModel BuildPatchModel(const geometry::Cells& cells, const std::vector<std::int32_t>& patch, std::int32_t patch_count, double spacing_m);
+PatchModel BuildPatchModel(const geometry::Cells& cells, const std::vector<std::int32_t>& patch, std::int32_t patch_count);
 
 /// Pairs (k < l) of patches that share a face between cells of one component, sorted, each once.
 std::vector<std::array<std::int32_t, 2>> PatchPairs(const geometry::Cells& cells, const std::vector<std::int32_t>& patch);

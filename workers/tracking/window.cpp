@@ -15,11 +15,10 @@ namespace {
 using geometry::FrameState;
 using geometry::PoseTrack;
 
-constexpr double kSampleSpacingM = 0.010;
 // Points a frame in all iterations but the last few: association is nearly all of the cost, and a frame has far more points than unknowns.
-constexpr std::size_t kPointsEarly = 6000;
-constexpr std::size_t kPointsLate = 24000;
-constexpr std::size_t kPointsMeasured = 20000;
+constexpr std::size_t kPointsEarly = 3000;
+constexpr std::size_t kPointsLate = 12000;
+constexpr std::size_t kPointsMeasured = 5000;
 constexpr int kLateIterations = 2;
 constexpr int kFirstMeanSteps = 4;
 
@@ -29,7 +28,8 @@ FitStage StageOf(const TrackOptions& options, std::int32_t iteration, std::size_
   const double progress = options.iterations > 1 ? static_cast<double>(iteration) / (options.iterations - 1) : 1.0;
   FitStage stage;
   stage.sigma_m = options.sigma_start_m * std::pow(options.sigma_end_m / options.sigma_start_m, progress);
-  stage.reach_m = std::max(2.5 * stage.sigma_m, 1.5 * kSampleSpacingM);
+  stage.coarse = stage.sigma_m > 0.010;
+  stage.reach_m = stage.coarse ? std::max(2 * stage.sigma_m, 0.030) : 0.020;
   stage.cosine_min = std::cos(options.normal_angle_max_deg * std::numbers::pi / 180);
   stage.depth_tolerance_m = options.depth_tolerance_m;
   stage.regulariser = options.regulariser;
@@ -118,7 +118,7 @@ absl::StatusOr<PoseTrack> TrackWindow(const geometry::Template& model, const std
   track.confidence.assign(window.size(), 0);
 
   if (!fitted.frame.empty()) {
-    const PatchModel patches = BuildPatchModel(model.cells, model.patch, model.patch_count, kSampleSpacingM);
+    const PatchModel patches = BuildPatchModel(model.cells, model.patch, model.patch_count);
     FrameFit fit(patches);
     FitFrames(fit, patches, options, fitted, progress);
     for (std::size_t i = 0; i < fitted.frame.size(); ++i) {

@@ -33,7 +33,7 @@ Pose RandomPoses(const PatchModel& model, std::uint64_t seed) {
 
 PatchModel LimbModel() {
   const geometry::Template model = LimbTemplate(0);
-  return BuildPatchModel(model.cells, model.patch, model.patch_count, 0.02);
+  return BuildPatchModel(model.cells, model.patch, model.patch_count);
 }
 
 /// The pose after the small twist of one patch, by the same convention as the equations.
@@ -76,7 +76,7 @@ TEST(DataBlock, DerivativesMatchNumericOnes) {
 
 TEST(PoseDistance, IsTheSumOverTheCellsOfBothPatches) {
   const geometry::Template limb = LimbTemplate(0);
-  const PatchModel model = BuildPatchModel(limb.cells, limb.patch, limb.patch_count, 0.02);
+  const PatchModel model = BuildPatchModel(limb.cells, limb.patch, limb.patch_count);
   const Pose pose = RandomPoses(model, 1);
   const Pose other = RandomPoses(model, 2);
   double expected = 0;
@@ -168,6 +168,19 @@ TEST(NormalEquations, SolveLikeADenseSolver) {
   ASSERT_TRUE(equations.Solve(0, twists));
   const Eigen::VectorXd expected = dense.fullPivLu().solve(right);
   for (std::int32_t k = 0; k < model.patch_count; ++k) EXPECT_TRUE(twists[k].isApprox(expected.segment<6>(6 * k), 1e-8)) << k;
+}
+
+TEST(BlockCholesky, RefusesWhatIsNotPositiveDefinite) {
+  BlockCholesky cholesky(2, {{0, 1}});
+  cholesky.Diagonal(0) = Matrix6::Identity();
+  cholesky.Diagonal(1) = Matrix6::Identity();
+  cholesky.SetLower(0, 0.9 * Matrix6::Identity());
+  EXPECT_TRUE(cholesky.Factorise());
+  cholesky.Clear();
+  cholesky.Diagonal(0) = Matrix6::Identity();
+  cholesky.Diagonal(1) = Matrix6::Identity();
+  cholesky.SetLower(0, 1.1 * Matrix6::Identity());
+  EXPECT_FALSE(cholesky.Factorise());
 }
 
 TEST(UpdateMeanPose, FindsThePoseThatAllShare) {

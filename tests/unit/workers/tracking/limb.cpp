@@ -49,7 +49,7 @@ TriangleMesh LimbMesh() {
 }
 
 Vec3 Bend(const Vec3& x, double angle) {
-  constexpr double kHalfWidth = 0.06;
+  constexpr double kHalfWidth = 0.15;
   const double t = std::clamp((x.x() + kHalfWidth) / (2 * kHalfWidth), 0.0, 1.0);
   const double share = t * t * (3 - 2 * t);
   return Eigen::AngleAxisd(share * angle, Vec3::UnitZ()) * x;
@@ -67,9 +67,9 @@ TriangleMesh Moved(TriangleMesh mesh, const Rigid3& pose) {
 
 geometry::Template LimbTemplate(std::int32_t frame) {
   geometry::Template model;
-  model.cells = LatticeCells(LimbMesh(), 0.03, Vec3(0.015, 0.004, 0.002));
+  model.cells = LatticeCells(LimbMesh(), 0.025, Vec3(0.012, 0.004, 0.002));
   model.frame = frame;
-  model.patch = ClusterPatches(model.cells, 24, 1).value();
+  model.patch = ClusterPatches(model.cells, 60, 1).value();
   model.patch_count = 1 + *std::ranges::max_element(model.patch);
   return model;
 }

@@ -40,11 +40,11 @@ Errors ErrorsAgainst(const geometry::TrackedTake& take, const std::vector<Triang
   return {sum / static_cast<double>(errors.size()), errors[errors.size() * 95 / 100]};
 }
 
-/// A limb that bends by up to 70° and back, 5° a frame and more.
+/// A limb that bends by up to 40°, by 5° a frame.
 struct BendingTake {
   explicit BendingTake(double noise_m, std::int32_t frames = 12) : model(LimbTemplate(0)) {
     for (std::int32_t f = 0; f < frames; ++f) {
-      truth.push_back(Bent(LimbMesh(), 1.2 * std::sin(0.13 * f)));
+      truth.push_back(Bent(LimbMesh(), 0.7 * std::sin(0.13 * f)));
       observed.push_back(Observe(f, truth.back(), 6000, noise_m));
       options.frames.push_back(f);
     }
@@ -187,7 +187,7 @@ TEST(Guide, FollowsOutwardFromATemplateInTheMiddle) {
   BendingTake take(0.001);
   // The template's frame is 6: turn the take so that the limb is straight there.
   for (std::int32_t f = 0; f < 12; ++f) {
-    take.truth[f] = Bent(LimbMesh(), 0.15 * (f - 6));
+    take.truth[f] = Bent(LimbMesh(), 0.1 * (f - 6));
     take.observed[f] = Observe(f, take.truth[f], 6000, 0.001);
   }
   take.model.frame = 6;
