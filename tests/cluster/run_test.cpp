@@ -11,29 +11,44 @@
 namespace vorocast::cluster {
 namespace {
 
+using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsSupersetOf;
 using testing::Key;
 using testing::Not;
+using testing::UnorderedElementsAre;
+
+/// What a run in the undisturbed run's folders computes that had not been computed there before.
+std::vector<std::string> Computes(const std::vector<std::string>& arguments) {
+  const std::filesystem::path state = Scratch() / "undisturbed" / "state";
+  const auto before = FinishedTasks(state);
+  const Outcome outcome = RunProgram(arguments);
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+  std::vector<std::string> computed;
+  for (const auto& [task, count] : FinishedTasks(state)) {
+    const auto found = before.find(task);
+    if (found == before.end() || found->second < count) computed.push_back(task);
+  }
+  return computed;
+}
 
 TEST(RunCommand, LeavesEveryStagesResult) {
   EXPECT_THAT(UndisturbedDigests(),
-              IsSupersetOf({Key("tracked.h5"), Key("simulated.h5"), Key("cells/frame_000000.h5"), Key("cells/frame_000011.h5"),
-                            Key("sheets/points.png"), Key("sheets/cells.png"), Key("sheets/tracked.png"), Key("sheets/simulated.png")}));
+              IsSupersetOf({Key("template.h5"), Key("tracked.h5"), Key("simulated.h5"), Key("cells/frame_000000.h5"), Key("cells/frame_000011.h5")}));
 }
 
 TEST(RunCommand, AnotherEffectComputesOnlyTheEffect) {
   ASSERT_FALSE(UndisturbedDigests().empty());
-  const std::filesystem::path folder = Scratch() / "undisturbed";
-  const auto before = FinishedTasks(folder / "state");
-  const Outcome outcome = RunProgram(RunArguments(folder, "release"));
-  EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
-  std::vector<std::string> computed;
-  for (const auto& [task, count] : FinishedTasks(folder / "state")) {
-    const auto found = before.find(task);
-    if (found == before.end() || found->second < count) computed.push_back(task);
-  }
-  EXPECT_THAT(computed, testing::UnorderedElementsAre("release: simulate", "simulated: sheet"));
+  EXPECT_THAT(Computes(RunArguments(Scratch() / "undisturbed", "release")), ElementsAre("release: simulate"));
+}
+
+TEST(RunCommand, SheetsComeOnTopOfWhatIsThere) {
+  ASSERT_FALSE(UndisturbedDigests().empty());
+  std::vector<std::string> arguments = RunArguments(Scratch() / "undisturbed");
+  std::erase(arguments, "--no-sheets");
+  EXPECT_THAT(Computes(arguments), UnorderedElementsAre("points: sheet", "cells: sheet", "tracked: sheet", "simulated: sheet"));
+  EXPECT_THAT(Digests(Scratch() / "undisturbed" / "out"),
+              IsSupersetOf({Key("sheets/points.png"), Key("sheets/cells.png"), Key("sheets/tracked.png"), Key("sheets/simulated.png")}));
 }
 
 TEST(RunCommand, ABadFrameCostsThatFrame) {

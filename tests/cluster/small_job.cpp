@@ -18,14 +18,15 @@ const std::filesystem::path& SmallCapture() {
 }
 
 std::vector<std::string> RunArguments(const std::filesystem::path& folder, const std::string& effect) {
-  return {"run",        SmallCapture().string(),
-          "--out",      (folder / "out").string(),
-          "--state",    (folder / "state").string(),
-          "--workers",  "2",
-          "--cells",    "400",
-          "--patches",  "30",
-          "--template", "0",
-          "--effect",   effect};
+  return {"run",         SmallCapture().string(),
+          "--out",       (folder / "out").string(),
+          "--state",     (folder / "state").string(),
+          "--workers",   "2",
+          "--cells",     "400",
+          "--patches",   "30",
+          "--template",  "0",
+          "--no-sheets", "--effect",
+          effect};
 }
 
 const std::map<std::string, std::string>& UndisturbedDigests() {
