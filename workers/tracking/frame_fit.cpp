@@ -17,6 +17,7 @@ constexpr float kAlongSurface = 0.15F;
 constexpr double kOutlierSigmas = 2.5;
 // Inner points hold the volume together, but cells of two frames never correspond: much more weight and they hold it back.
 constexpr double kInnerWeight = 0.03;
+constexpr double kInnerReach = 1.2;  // cell spacings
 // Mass of the regulariser for each surface point, whatever the number of points, cells and patches; 0.3 of it is best on captures with known motion.
 constexpr double kRegulariserBalance = 0.2;
 constexpr double kDamping = 1e-4;
@@ -115,7 +116,7 @@ void FrameFit::AssociateSurface(const ObservedFrame& frame, const FitStage& stag
 }
 
 void FrameFit::AssociateInner(const ObservedFrame& frame, const FitStage& stage) {
-  const double reach = 1.5 * model_.cell_spacing_m;
+  const double reach = kInnerReach * model_.cell_spacing_m;
   const double sigma = std::max(stage.sigma_m, 0.5 * model_.cell_spacing_m);
   for (std::size_t i = stage.phase % stage.inner_stride; i < frame.inner.size(); i += stage.inner_stride) {
     const Vec3f x = (frame.inner[i] - origin_).cast<float>();
@@ -142,7 +143,7 @@ void FrameFit::Step(const ObservedFrame& frame, const FitStage& stage, const std
   PoseSurface(pose, stage);
   AssociateSurface(frame, stage);
   if (!frame.inner.empty()) {
-    PoseInner(pose, 1.5 * model_.cell_spacing_m);
+    PoseInner(pose, kInnerReach * model_.cell_spacing_m);
     AssociateInner(frame, stage);
   }
 

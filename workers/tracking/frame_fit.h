@@ -20,7 +20,7 @@ struct FitStage {
   double depth_tolerance_m = 0.015;
   double regulariser = 0.3;
   std::size_t stride = 1;  // every stride-th surface point is used, beginning at `phase`
-  std::size_t inner_stride = 4;
+  std::size_t inner_stride = 8;
   std::size_t phase = 0;
 };
 

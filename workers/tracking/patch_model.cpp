@@ -16,7 +16,7 @@ namespace {
 using geometry::Mat3;
 using geometry::Vec3;
 
-constexpr double kFineSpacingM = 0.010;
+constexpr double kFineSpacingM = 0.012;
 constexpr double kCoarseSpacingM = 0.020;
 
 /// Mass and second moment of a patch about its centre.

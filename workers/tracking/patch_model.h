@@ -42,7 +42,7 @@ struct PatchModel {
   std::vector<geometry::Vec3> centre;         // [patches] centroid of each patch
   std::vector<PatchEdge> edges;               // sorted by (k, l); then weak ones that tie what is not connected
   double edge_mass = 0;                       // Σ mass over the edges
-  std::vector<SurfaceSample> surface;         // 10 mm apart
+  std::vector<SurfaceSample> surface;         // 12 mm apart
   std::vector<SurfaceSample> surface_coarse;  // 20 mm apart, for wide associations: a quarter of the candidates
   std::vector<InnerSample> inner;             // [n] one a cell
   double cell_spacing_m = 0;                  // distance between neighbouring centroids, about

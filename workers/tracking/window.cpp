@@ -29,7 +29,7 @@ FitStage StageOf(const TrackOptions& options, std::int32_t iteration, std::size_
   FitStage stage;
   stage.sigma_m = options.sigma_start_m * std::pow(options.sigma_end_m / options.sigma_start_m, progress);
   stage.coarse = stage.sigma_m > 0.010;
-  stage.reach_m = stage.coarse ? std::max(2 * stage.sigma_m, 0.030) : 0.020;
+  stage.reach_m = stage.coarse ? std::max(2 * stage.sigma_m, 0.030) : 0.016;
   stage.cosine_min = std::cos(options.normal_angle_max_deg * std::numbers::pi / 180);
   stage.depth_tolerance_m = options.depth_tolerance_m;
   stage.regulariser = options.regulariser;
