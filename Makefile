@@ -39,6 +39,7 @@ bench: configure
 
 check: configure
 	@$(CLANG_FORMAT) --dry-run --Werror $(SOURCES)
+	@cmake --build $(BUILD) --target tests_style && $(BUILD)/bin/tests_style --gtest_brief=1
 	@deploy/run_clang_tidy.sh $(BUILD)
 
 format:

@@ -20,6 +20,10 @@ function(vorocast_check_layers TARGET)
     if(other AND NOT other IN_LIST may_use_${own})
       message(FATAL_ERROR "${TARGET} (layer ${own}) must not link ${dependency} (layer ${other})")
     endif()
+    # Folders are added bottom to top, so what stands above does not exist yet.
+    if(other AND NOT TARGET ${dependency})
+      message(FATAL_ERROR "${TARGET} must not link ${dependency}, which stands above it (the order of add_subdirectory)")
+    endif()
   endforeach()
 endfunction()
 

@@ -15,7 +15,7 @@ packages=(
   # everyday libraries
   libspdlog-dev libfmt-dev libcli11-dev nlohmann-json3-dev
   # tests, benchmarks, checks
-  libgtest-dev libgmock-dev libbenchmark-dev voro++-dev libceres-dev python3 python3-h5py clang-format-14 clang-tidy-14
+  libgtest-dev libgmock-dev python3 python3-h5py clang-format-14 clang-tidy-14
 )
 
 missing=()

@@ -54,6 +54,15 @@ std::string ExplainTask(const State& state, const Job& job, const Task& task) {
   return fmt::format("{} was not started: {}.", task.name, job.stopped.value_or("what it reads was cancelled"));
 }
 
+/// A bad frame is made up for and a task that lacked an input failed for another's sake: neither is why the job failed, if anything else is.
+const Task& FailureThatCounts(const State& state, const Job& job) {
+  for (const TaskIndex index : job.failed) {
+    const Task& task = state.tasks[index];
+    if (task.kind != tasks::Kind::kTessellate && std::get<Failed>(task.state).cause != Cause::kNeeds) return task;
+  }
+  return state.tasks[*job.failed.begin()];
+}
+
 }  // namespace
 
 std::string Explain(const State& state, const Job& job) {
@@ -62,7 +71,7 @@ std::string Explain(const State& state, const Job& job) {
   const Phase phase = PhaseOf(job);
   if (phase == Phase::kDone && job.bad_frames > 0) return fmt::format("{} is done; {} bad frames were made up for.", job.id, job.bad_frames);
   if (phase == Phase::kDone) return fmt::format("{} is done.", job.id);
-  if (phase == Phase::kFailed) return fmt::format("{} failed: {}", job.id, ExplainTask(state, job, state.tasks[*job.failed.begin()]));
+  if (phase == Phase::kFailed) return fmt::format("{} failed: {}", job.id, ExplainTask(state, job, FailureThatCounts(state, job)));
   if (!job.running.empty()) {
     return fmt::format("{} runs: {} tasks at work, the first of them {}", job.id, job.running.size(),
                        ExplainTask(state, job, state.tasks[*job.running.begin()]));

@@ -11,7 +11,7 @@ namespace {
 template <typename T>
 absl::Status Read(const nlohmann::json& json, const char* name, T& value) {
   const auto field = json.find(name);
-  if (field == json.end()) return absl::InvalidArgumentError(fmt::format("job.{} is missing", name));
+  if (field == json.end()) return absl::OkStatus();  // recorded before there was such a field
   try {
     field->get_to(value);
   } catch (const nlohmann::json::exception&) {
@@ -23,7 +23,7 @@ absl::Status Read(const nlohmann::json& json, const char* name, T& value) {
 template <typename Options>
 absl::Status ReadOptions(const nlohmann::json& json, const char* name, Options& options) {
   const auto field = json.find(name);
-  if (field == json.end()) return absl::InvalidArgumentError(fmt::format("job.{} is missing", name));
+  if (field == json.end()) return absl::OkStatus();  // recorded before there was such a field
   return base::Annotate(tasks::FromJson(*field, options), fmt::format("job.{}", name));
 }
 

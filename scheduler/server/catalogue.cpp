@@ -2,6 +2,7 @@
 #include "scheduler/server/catalogue.h"
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include "services/base/status.h"
 
@@ -60,7 +61,11 @@ absl::Status Catalogue::Restore(Turn& turn, store::Snapshot snapshot) {
       return absl::DataLossError(fmt::format("job {} belongs to sequence {}, which is not on record", id, stored.added.sequence));
     const auto json = nlohmann::json::parse(stored.added.spec_json, nullptr, false);
     auto spec = plan::JobSpecFromJson(json);
-    if (!spec.ok()) return base::Annotate(spec.status(), fmt::format("job {} as recorded", id));
+    if (!spec.ok()) {
+      // One job that a later version cannot read must not keep the others from going on.
+      spdlog::error("job passed over: job={} error=\"{}\"", id, std::string(spec.status().message()));
+      continue;
+    }
     CatalogueJob& job = jobs_[id];
     job = {.added = std::move(stored.added), .spec = *std::move(spec)};
     job_order_.push_back(id);
@@ -114,6 +119,9 @@ absl::StatusOr<const CatalogueSequence*> Catalogue::Add(Turn& turn, const std::s
     }
   }
   if (fresh.empty()) return &sequence;
+  if (sequence.frames.size() + fresh.size() > tasks::kFramesMax) {
+    return absl::InvalidArgumentError(fmt::format("a take has at most {} frames; split it", tasks::kFramesMax));
+  }
   if (sequence.closed) {
     return absl::FailedPreconditionError(
         fmt::format("take \"{}\" of session \"{}\" is closed; open another name for more frames", sequence.opened.name, sequence.opened.session));
@@ -163,7 +171,7 @@ absl::StatusOr<const CatalogueSequence*> Catalogue::FindSequence(const std::stri
 
 absl::StatusOr<const CatalogueJob*> Catalogue::FindJob(const std::string& id) const {
   const auto found = jobs_.find(id);
-  if (found == jobs_.end()) return absl::NotFoundError(fmt::format("there is no job \"{}\"; 'vorocast list' names those there are", id));
+  if (found == jobs_.end()) return absl::NotFoundError(fmt::format("there is no job \"{}\"; 'vorocast status' names those there are", id));
   return &found->second;
 }
 

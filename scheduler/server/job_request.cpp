@@ -23,6 +23,11 @@ absl::Status CheckRange(std::int32_t value, std::int32_t low, std::int32_t high,
   return absl::InvalidArgumentError(fmt::format("{} is {}; it must be from {} to {}", field, value, low, high));
 }
 
+/// They would reach other people's terminals and the log.
+bool HasControlCharacters(const std::string& text) {
+  return std::ranges::any_of(text, [](unsigned char c) { return c < 0x20 || c == 0x7f; });
+}
+
 absl::StatusOr<nlohmann::json> EffectOf(const std::string& text) {
   if (text.empty()) return nlohmann::json();
   if (text.size() > kEffectBytesMax)
@@ -31,6 +36,7 @@ absl::StatusOr<nlohmann::json> EffectOf(const std::string& text) {
   if (json.is_discarded()) return absl::InvalidArgumentError("effect_json is not JSON");
   auto effect = simulation::NormaliseEffect(json);
   if (!effect.ok()) return base::Annotate(effect.status(), "effect_json");
+  if (HasControlCharacters(effect->at("name").get<std::string>())) return absl::InvalidArgumentError("effect_json: name has control characters");
   return effect;
 }
 
@@ -38,6 +44,7 @@ absl::StatusOr<nlohmann::json> EffectOf(const std::string& text) {
 
 absl::StatusOr<plan::JobSpec> SpecOf(const v1::SubmitJobRequest& request) {
   plan::JobSpec spec;
+  if (HasControlCharacters(request.user())) return absl::InvalidArgumentError("user has control characters");
   if (request.user().size() > kUserMax) return absl::InvalidArgumentError(fmt::format("user has more than {} characters", kUserMax));
   RETURN_IF_ERROR(CheckRange(request.cells(), 0, kCellsMax, "cells"));
   RETURN_IF_ERROR(CheckRange(request.iterations(), INT32_MIN, 1000, "iterations"));

@@ -38,14 +38,20 @@ std::string StableAddress(const std::filesystem::path& state) {
   if (socket.size() <= kUnixPathMax) return "unix:" + socket;
   std::ifstream file(state / "scheduler.json");
   const auto announced = nlohmann::json::parse(file, nullptr, false);
-  if (announced.is_object() && announced.value("address", "").starts_with("127.0.0.1:")) return announced["address"];
+  if (announced.is_object() && announced.contains("address") && announced["address"].is_string()) {
+    const std::string address = announced["address"];
+    if (address.starts_with("127.0.0.1:")) return address;
+  }
   return "127.0.0.1:0";
 }
 
 absl::Status Announce(const std::filesystem::path& state, const std::string& address) {
   const std::filesystem::path path = state / "scheduler.json";
   const std::filesystem::path temporary = state / "scheduler.json.new";
-  std::ofstream(temporary) << nlohmann::json{{"address", address}, {"pid", getpid()}}.dump() << "\n";
+  std::ofstream file(temporary);
+  file << nlohmann::json{{"address", address}, {"pid", getpid()}}.dump() << "\n";
+  file.close();
+  if (file.fail()) return absl::UnavailableError(fmt::format("{}: cannot be written; is the disk full?", temporary.string()));
   std::error_code error;
   std::filesystem::rename(temporary, path, error);
   if (error) return absl::UnavailableError(fmt::format("{}: cannot be written: {}", path.string(), error.message()));

@@ -65,6 +65,10 @@ void AddSynth(CLI::App& program, int& exit_code) {
         ASSIGN_OR_RETURN(const capture::CaptureOptions source, flags->source.Parse());
         RETURN_IF_ERROR(synth::ScanMeshes(flags->from, source, flags->folder, flags->options, progress));
       } else {
+        if (!flags->source.frames.empty() || !flags->source.units.empty() || !flags->source.up.empty() || !flags->source.name.empty()) {
+          return absl::InvalidArgumentError(
+              "--frames, --units, --up and --name describe the meshes of --from; --count is how many frames to make up");
+        }
         if (flags->source.frames_per_second > 0) flags->options.frames_per_second = flags->source.frames_per_second;
         RETURN_IF_ERROR(synth::SynthesiseCapture(flags->folder, flags->options, progress));
       }

@@ -187,6 +187,8 @@ absl::StatusOr<EmbeddedService> EmbeddedService::Start(const EmbeddedServiceOpti
 
 const std::string& EmbeddedService::address() const { return process_->address; }
 
+bool EmbeddedService::started_here() const { return process_->child > 0; }
+
 absl::Status EmbeddedService::Ensure() {
   if (process_->ChildIsAlive()) return absl::OkStatus();
   if (auto running = RunningSchedulerAddress(process_->options.state); running.ok()) {

@@ -31,6 +31,8 @@ class EmbeddedService {
   ~EmbeddedService();
 
   const std::string& address() const;
+  /// False while another process's scheduler is used.
+  bool started_here() const;
   /// Starts the scheduler again if it has died; does nothing while it runs. The address may change.
   absl::Status Ensure();
 

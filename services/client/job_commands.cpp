@@ -56,6 +56,16 @@ absl::Status WithJob(const JobChoice& choice, const JobAction& action) {
   return action(client, jobs.front().id());
 }
 
+/// Shows the job until it has ended; an error unless it is done then.
+absl::Status FollowToItsEnd(SchedulerClient& client, const std::string& job_id) {
+  JobView view;
+  ASSIGN_OR_RETURN(const v1::Job job, client.Watch(
+                                          job_id, [&](const v1::Job& now) { view.Show(now); }, Interrupted));
+  view.Finish(job);
+  if (job.state() == v1::DONE) return absl::OkStatus();
+  return absl::AbortedError(fmt::format("job {} is not done; 'vorocast explain {}' says why", job_id, job_id));
+}
+
 void SetExitCode(int& exit_code, const absl::Status& status) { exit_code = status.ok() ? 0 : PrintError(status); }
 
 /// A command that does one thing with one job.
@@ -91,19 +101,16 @@ void AddSubmit(CLI::App& program, int& exit_code) {
       ASSIGN_OR_RETURN(const capture::Capture capture, capture::OpenCapture(flags->folder, options));
       RETURN_IF_ERROR(CheckCapture(capture));
       ASSIGN_OR_RETURN(SchedulerClient client, flags->scheduler.Connect());
+      CatchInterrupts();
       PercentView view("Frames");
-      ASSIGN_OR_RETURN(const v1::Sequence sequence, client.Upload(capture, flags->session, [&](double fraction) { view.Show(fraction); }));
+      ASSIGN_OR_RETURN(const v1::Sequence sequence, client.Upload(
+                                                        capture, flags->session, [&](double fraction) { view.Show(fraction); }, Interrupted));
       view.Finish();
       request.set_sequence_id(sequence.id());
       ASSIGN_OR_RETURN(const v1::Job job, client.Submit(request));
       fmt::print("Job {}\n", job.id());
       if (!flags->watch) return absl::OkStatus();
-      CatchInterrupts();
-      JobView job_view;
-      ASSIGN_OR_RETURN(const v1::Job last, client.Watch(
-                                               job.id(), [&](const v1::Job& now) { job_view.Show(now); }, Interrupted));
-      job_view.Finish(last);
-      return absl::OkStatus();
+      return FollowToItsEnd(client, job.id());
     };
     SetExitCode(exit_code, submit());
   });
@@ -168,15 +175,10 @@ void AddFetch(CLI::App& program, int& exit_code) {
 void AddJobCommands(CLI::App& program, int& exit_code) {
   AddSubmit(program, exit_code);
   AddStatus(program, exit_code);
-  AddJobCommand(program, exit_code, "watch", "Show a job as it goes on, until it has ended",
-                [](SchedulerClient& client, const std::string& job_id) -> absl::Status {
-                  CatchInterrupts();
-                  JobView view;
-                  ASSIGN_OR_RETURN(const v1::Job job, client.Watch(
-                                                          job_id, [&](const v1::Job& now) { view.Show(now); }, Interrupted));
-                  view.Finish(job);
-                  return absl::OkStatus();
-                });
+  AddJobCommand(program, exit_code, "watch", "Show a job as it goes on, until it has ended", [](SchedulerClient& client, const std::string& job_id) {
+    CatchInterrupts();
+    return FollowToItsEnd(client, job_id);
+  });
   AddExplain(program, exit_code);
   AddJobCommand(program, exit_code, "cancel", "Stop a job; what has finished stays",
                 [](SchedulerClient& client, const std::string& job_id) -> absl::Status {

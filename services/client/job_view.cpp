@@ -74,7 +74,7 @@ std::string DescribeJobLine(const v1::Job& job) {
     if (stage.done() == stage.total() && stage.reused() == stage.total()) continue;
     text += fmt::format("{}{} {}/{}", text.empty() ? "" : " · ", stage.kind(), stage.done(), stage.total());
   }
-  if (text.empty()) text = StateText(job);
+  if (text.empty() || HasEnded(job)) text = text.empty() ? StateText(job) : StateText(job) + ": " + text;
   if (!HasEnded(job) && job.seconds_left() >= 0) text += fmt::format(" · about {} left", FormatDuration(job.seconds_left()));
   return text;
 }

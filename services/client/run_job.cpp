@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "services/client/run_job.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <thread>
@@ -13,12 +14,14 @@
 #include "services/client/interrupt.h"
 #include "services/client/job_view.h"
 #include "services/client/percent_view.h"
+#include "services/storage/xdmf.h"
 
 namespace vorocast::client {
 namespace {
 
 /// So many times in a row the scheduler may be unreachable before the client gives up.
 constexpr int kReconnectsMax = 20;
+constexpr std::int32_t kAbandonedJobsMax = 200;
 constexpr auto kReconnectPause = std::chrono::milliseconds(250);
 
 /// Runs share one state folder, and the same folder of frames may be run with other flags or in part; each gets a sequence of its own.
@@ -36,14 +39,23 @@ std::string SessionOf(const capture::Capture& capture) {
 
 absl::Status InterruptedStatus() { return absl::CancelledError("stopped; the same command goes on from here"); }
 
+/// A client that was killed could not cancel its job. Only the client that starts the scheduler calls this, before it submits its own: what
+/// was left behind would be computed first otherwise. Its finished results stay.
+absl::Status CancelAbandonedJobs(SchedulerClient& client) {
+  ASSIGN_OR_RETURN(const std::vector<v1::Job> jobs, client.List(kAbandonedJobsMax));
+  for (const v1::Job& job : jobs) {
+    if (!HasEnded(job)) RETURN_IF_ERROR(client.Cancel(job.id()).status());
+  }
+  return absl::OkStatus();
+}
+
 /// Submits the job and follows it to its end; when the scheduler dies on the way, starts it again and goes on.
 absl::StatusOr<v1::Job> FollowJob(EmbeddedService& service, std::unique_ptr<SchedulerClient>& client, const v1::SubmitJobRequest& request) {
   JobView view;
   std::string job_id;
   int reconnects = 0;
   while (true) {
-    absl::StatusOr<v1::Job> job = client->Submit(request);
-    if (job.ok() && (job->state() == v1::FAILED || job->state() == v1::CANCELLED)) job = client->Retry(job->id());
+    absl::StatusOr<v1::Job> job = job_id.empty() ? client->Submit(request) : client->Get(job_id);
     if (job.ok()) {
       job_id = job->id();
       job = client->Watch(
@@ -71,8 +83,18 @@ absl::StatusOr<v1::Job> FollowJob(EmbeddedService& service, std::unique_ptr<Sche
   }
 }
 
+/// XDMF beside the takes, for ParaView.
+absl::Status WriteXdmfBeside(const std::filesystem::path& folder) {
+  const std::filesystem::path tracked = folder / "tracked.h5";
+  const std::filesystem::path simulated = folder / "simulated.h5";
+  if (std::filesystem::exists(tracked)) RETURN_IF_ERROR(storage::WriteXdmf(tracked, "", folder / "tracked.xdmf"));
+  if (std::filesystem::exists(tracked) && std::filesystem::exists(simulated))
+    RETURN_IF_ERROR(storage::WriteXdmf(simulated, tracked, folder / "simulated.xdmf"));
+  return absl::OkStatus();
+}
+
 void PrintResults(const v1::Job& job, const std::filesystem::path& out, double seconds) {
-  fmt::print("\nDone in {}. Results in {}:\n", FormatDuration(seconds), out.string());
+  fmt::print("\n{} after {}. Results in {}:\n", job.state() == v1::DONE ? "Done" : "Ended", FormatDuration(seconds), out.string());
   for (const v1::Output& output : job.outputs()) {
     if (!output.name().starts_with("cells/")) fmt::print("  {:<24} {:>8.1f} MB\n", output.name(), static_cast<double>(output.size()) / 1e6);
   }
@@ -115,7 +137,7 @@ absl::Status FetchOutputs(SchedulerClient& client, const v1::Job& job, const std
     RETURN_IF_ERROR(client.Fetch(job.id(), output, folder / output.name()));
     view.Show((fetched += static_cast<double>(output.size())) / total);
   }
-  return absl::OkStatus();
+  return WriteXdmfBeside(folder);
 }
 
 int RunJob(const capture::Capture& capture, v1::SubmitJobRequest request, const RunOptions& options) {
@@ -127,9 +149,13 @@ int RunJob(const capture::Capture& capture, v1::SubmitJobRequest request, const 
   auto service = EmbeddedService::Start({options.state, options.workers});
   if (!service.ok()) return PrintError(service.status());
   auto client = std::make_unique<SchedulerClient>(service->address());
+  if (service->started_here()) {
+    if (const absl::Status status = CancelAbandonedJobs(*client); !status.ok()) return PrintError(status);
+  }
 
   PercentView upload_view("Frames");
-  const auto sequence = client->Upload(capture, SessionOf(capture), [&](double fraction) { upload_view.Show(fraction); });
+  const auto sequence = client->Upload(
+      capture, SessionOf(capture), [&](double fraction) { upload_view.Show(fraction); }, Interrupted);
   if (!sequence.ok()) return PrintError(sequence.status());
   upload_view.Finish();
 

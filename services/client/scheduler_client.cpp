@@ -48,9 +48,11 @@ SchedulerClient::SchedulerClient(const std::string& address) : address_(address)
   jobs_ = v1::Jobs::NewStub(channel);
 }
 
-absl::StatusOr<v1::Sequence> SchedulerClient::Upload(const capture::Capture& capture, const std::string& session, const base::Progress& progress) {
+absl::StatusOr<v1::Sequence> SchedulerClient::Upload(const capture::Capture& capture, const std::string& session, const base::Progress& progress,
+                                                     const std::function<bool()>& interrupted) {
   std::vector<v1::Blob> blobs;
   for (const capture::CaptureFrame& frame : capture.frames) {
+    if (interrupted()) return absl::CancelledError("stopped; the same command goes on from here");
     ASSIGN_OR_RETURN(const base::Digest digest, base::HashFile(frame.path));
     v1::Blob& blob = blobs.emplace_back();
     blob.set_sha256(digest.Hex());
@@ -82,9 +84,10 @@ absl::StatusOr<v1::Sequence> SchedulerClient::Upload(const capture::Capture& cap
     }
     ASSIGN_OR_RETURN(const v1::MissingReply missing, Call(*captures_, &v1::Captures::Stub::Missing, ask));
     std::set<std::string> wanted;
-    for (const v1::Blob& blob : missing.blobs()) wanted.insert(blob.sha256());
+    for (const v1::Blob& blob : missing.blobs()) wanted.insert(blob.sha256() + blob.extension());
     for (std::size_t i = first; i < last; ++i) {
-      if (wanted.erase(blobs[i].sha256()) > 0) RETURN_IF_ERROR(UploadBlob(blobs[i], capture.frames[i].path));
+      if (interrupted()) return absl::CancelledError("stopped; the same command goes on from here");
+      if (wanted.erase(blobs[i].sha256() + blobs[i].extension()) > 0) RETURN_IF_ERROR(UploadBlob(blobs[i], capture.frames[i].path));
       base::Report(progress, 0.3 + 0.7 * static_cast<double>(i + 1) / static_cast<double>(blobs.size()));
     }
     ASSIGN_OR_RETURN(sequence, Call(*captures_, &v1::Captures::Stub::Add, add));

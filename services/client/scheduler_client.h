@@ -22,8 +22,10 @@ class SchedulerClient {
 
   const std::string& address() const { return address_; }
 
-  /// Opens the capture's sequence, sends what the store does not have yet, adds all frames and closes it. May be repeated.
-  absl::StatusOr<v1::Sequence> Upload(const capture::Capture& capture, const std::string& session, const base::Progress& progress);
+  /// Opens the capture's sequence, sends what the store does not have yet, adds all frames and closes it. May be repeated. Asks
+  /// `interrupted` before every frame and ends with CANCELLED once that says true.
+  absl::StatusOr<v1::Sequence> Upload(const capture::Capture& capture, const std::string& session, const base::Progress& progress,
+                                      const std::function<bool()>& interrupted);
 
   absl::StatusOr<v1::Job> Submit(const v1::SubmitJobRequest& request);
   absl::StatusOr<v1::Job> Get(const std::string& job_id);

@@ -333,7 +333,8 @@ class LeaseLoop {
 
 absl::Status Validate(const LeaseLoopOptions& options) {
   if (options.scheduler.empty()) return absl::InvalidArgumentError("the scheduler's address is missing; give host:port or unix:/path");
-  if (options.slots < 1 || options.slots > 10000) return absl::InvalidArgumentError("slots must be from 1 to 10000");
+  if (options.slots < 1 || options.slots > kSlotsMax) return absl::InvalidArgumentError(fmt::format("slots must be from 1 to {}", kSlotsMax));
+  if (options.name.size() > kNameMax) return absl::InvalidArgumentError(fmt::format("a worker's name has at most {} characters", kNameMax));
   if (::access(options.program.c_str(), X_OK) != 0) {
     return absl::InvalidArgumentError(fmt::format("{} cannot be executed; tasks run in it", options.program.string()));
   }

@@ -12,6 +12,10 @@
 
 namespace vorocast::lease {
 
+/// What a scheduler takes.
+inline constexpr std::int32_t kSlotsMax = 4096;
+inline constexpr std::size_t kNameMax = 200;
+
 struct LeaseLoopOptions {
   std::string scheduler;          // host:port, or unix:/path
   std::int32_t slots = 1;         // tasks at once

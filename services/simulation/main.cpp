@@ -77,7 +77,9 @@ int main(int argc, char** argv) {
       app.add_option("--listen", options.listen, "Answers gRPC here: HOST:PORT, port 0 for any free one, or unix:/PATH. The address is printed");
   CLI::Option* store = app.add_option("--store", options.store, "The artifact folder for runs asked for over --listen");
   listen->needs(store);
-  app.add_option("--slots", options.lease.slots, "Simulations at once, from each side")->check(CLI::Range(1, 10000))->capture_default_str();
+  app.add_option("--slots", options.lease.slots, "Simulations at once, from each side")
+      ->check(CLI::Range(1, lease::kSlotsMax))
+      ->capture_default_str();
   app.add_option("--name", options.lease.name, "Name among the workers; host, process number and start time if not given");
   app.add_option("--drain-time", drain_seconds, "Seconds that running simulations get after SIGTERM before they are given back")
       ->check(CLI::Range(0.0, 86400.0))

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include "services/tasks/options.h"
 
 namespace vorocast::tasks {
 namespace {

@@ -78,8 +78,6 @@ class FieldReader {
   absl::Status status_;
 };
 
-/// A take of more frames than this would not fit the other bounds on a task either.
-inline constexpr std::size_t kFramesMax = 20000;
 inline constexpr std::int32_t kFrameNumberMax = 10'000'000;
 
 /// Whether the value is a whole number from low to high. JSON numbers may be stored signed, unsigned or (1e3) as floating point; the last is refused.

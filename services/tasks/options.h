@@ -13,6 +13,9 @@
 /// field, a wrong type or a value out of range with INVALID_ARGUMENT naming the field and what it may hold.
 namespace vorocast::tasks {
 
+/// A take of more frames than this would not fit the other bounds on a task either.
+inline constexpr std::size_t kFramesMax = 20000;
+
 /// How a captured file's numbers become metres, y up.
 struct CaptureFrameOptions {
   double metres_per_unit = 1;  // 0.01 for centimetres

@@ -34,6 +34,7 @@ const std::map<std::string, std::string>& UndisturbedDigests() {
     const std::filesystem::path folder = Scratch() / "undisturbed";
     const Outcome outcome = RunProgram(RunArguments(folder));
     EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+    EXPECT_TRUE(std::filesystem::exists(folder / "out" / "tracked.h5"));
     return Digests(folder / "out");
   }();
   return digests;

@@ -31,7 +31,8 @@ void RunMany(const Weather& weather, std::uint64_t first_seed, std::uint64_t cou
     SimulatedFarm farm(seed, weather);
     const absl::Status status = farm.Run();
     steps += farm.steps();
-    ASSERT_TRUE(status.ok()) << "VOROCAST_SEED=" << seed << " replays this: " << status;
+    ASSERT_TRUE(status.ok()) << "VOROCAST_SEED=" << seed << " build/bin/tests_scenario --gtest_filter=Scenario."
+                             << testing::UnitTest::GetInstance()->current_test_info()->name() << " replays this: " << status;
   }
   testing::Test::RecordProperty("steps", std::to_string(steps));
 }

@@ -116,6 +116,23 @@ TEST(Tree, EverySourceFileStartsWithItsLicence) {
   EXPECT_THAT(breaches, IsEmpty());
 }
 
+TEST(Tree, EveryBuildFileAndMessageStartsWithItsLicence) {
+  std::vector<std::string> breaches;
+  for (const char* top : {"cmake", "proto", "services", "workers", "scheduler", "tests", "deploy"}) {
+    for (const auto& entry : fs::recursive_directory_iterator(fs::path(VOROCAST_SOURCE_DIR) / top)) {
+      const std::string extension = entry.path().extension().string();
+      if (extension != ".cmake" && extension != ".proto" && extension != ".sh" && entry.path().filename() != "CMakeLists.txt") continue;
+      std::ifstream stream(entry.path());
+      std::string first, second;
+      std::getline(stream, first);
+      std::getline(stream, second);
+      const std::string licence = "SPDX-License-Identifier: AGPL-3.0-or-later";
+      if (first != "# " + licence && second != "# " + licence && first != "// " + licence) breaches.push_back(entry.path().string());
+    }
+  }
+  EXPECT_THAT(breaches, IsEmpty());
+}
+
 TEST(Tree, NamesSayTheirSubject) {
   static const std::regex kVague("(^|_)(misc|utils?|helpers?|common|manager|stuff)(_|\\.)");
   std::vector<std::string> breaches;

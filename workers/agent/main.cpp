@@ -29,7 +29,7 @@ int main(int argc, char** argv) {
   options.slots = static_cast<std::int32_t>(std::max(1u, std::thread::hardware_concurrency()));
   double drain_seconds = absl::ToDoubleSeconds(options.drain_time);
   app.add_option("--scheduler", options.scheduler, "The scheduler's address: HOST:PORT or unix:/PATH")->envname("VOROCAST_SCHEDULER");
-  app.add_option("--slots", options.slots, "Tasks at once")->check(CLI::Range(1, 10000))->capture_default_str();
+  app.add_option("--slots", options.slots, "Tasks at once")->check(CLI::Range(1, lease::kSlotsMax))->capture_default_str();
   app.add_option("--name", options.name, "Name among the workers; host, process number and start time if not given");
   app.add_option("--drain-time", drain_seconds, "Seconds that running tasks get after SIGTERM before they are given back")
       ->check(CLI::Range(0.0, 86400.0))

@@ -14,8 +14,6 @@
 namespace vorocast::agent {
 namespace {
 
-using geometry::Rigid3;
-
 /// Share of the time for reading, for the progress.
 constexpr double kRead = 0.2;
 

@@ -165,8 +165,13 @@ TEST(JobSpec, ComesBackFromJson) {
   broken["tessellate"]["cells"] = 0;
   EXPECT_THAT(std::string(JobSpecFromJson(broken).status().message()), HasSubstr("cells"));
   broken = ToJson(job);
-  broken.erase("patches");
+  broken["patches"] = "many";
   EXPECT_THAT(std::string(JobSpecFromJson(broken).status().message()), HasSubstr("patches"));
+  // A job recorded before there was such a field still counts.
+  nlohmann::json older = ToJson(job);
+  older.erase("sheets");
+  ASSERT_TRUE(JobSpecFromJson(older).ok());
+  EXPECT_EQ(JobSpecFromJson(older)->sheets, JobSpec().sheets);
 }
 
 TEST(SplitWindows, CoversEveryFrameAndSharesTheOverlap) {

@@ -50,6 +50,12 @@ TEST(DescribeJob, AnEndedJobHasNoTimeLeft) {
   EXPECT_THAT(DescribeJob(job), Not(HasSubstr("left")));
 }
 
+TEST(DescribeJobLine, AnEndedJobSaysHow) {
+  v1::Job job = JobWithAFailure();
+  job.set_state(v1::FAILED);
+  EXPECT_EQ(DescribeJobLine(job), "failed: tessellate 12/20");
+}
+
 TEST(DescribeJobLine, LeavesOutWhatWasThereAlready) {
   v1::Job job = JobWithAFailure();
   v1::Stage& reused = *job.add_stages();

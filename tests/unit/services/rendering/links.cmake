@@ -1,3 +1,3 @@
-#SPDX - License - Identifier : AGPL - 3.0 - or -later
-#The tests read pictures back with libpng itself.
+# SPDX-License-Identifier: AGPL-3.0-or-later
+# The tests read pictures back with libpng itself.
 target_link_libraries(tests_unit_services_rendering PRIVATE PNG::PNG)
