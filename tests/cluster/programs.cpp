@@ -110,7 +110,8 @@ std::map<std::string, std::string> Digests(const fs::path& folder) {
   std::map<std::string, std::string> digests;
   if (!fs::exists(folder)) return digests;
   for (const auto& entry : fs::recursive_directory_iterator(folder)) {
-    if (!entry.is_regular_file()) continue;
+    // XDMF names the files it describes by their absolute paths.
+    if (!entry.is_regular_file() || entry.path().extension() == ".xdmf") continue;
     const auto digest = base::HashFile(entry.path());
     digests[fs::relative(entry.path(), folder).generic_string()] = digest.ok() ? digest->Hex() : std::string(digest.status().message());
   }

@@ -41,7 +41,7 @@ bool Eventually(const std::function<bool()>& condition, double seconds = 120);
 /// A folder for one test program, removed at its end.
 const std::filesystem::path& Scratch();
 
-/// Relative path and SHA-256 of every file below a folder.
+/// Relative path and SHA-256 of every file below a folder that does not depend on where the folder is.
 std::map<std::string, std::string> Digests(const std::filesystem::path& folder);
 
 std::size_t CountFiles(const std::filesystem::path& folder);
