@@ -20,16 +20,18 @@ struct Observation {
   std::vector<double> inner_depth;    // [inner] distance to the surface, metres
 };
 
-/// k-medoids over the cell graph (paper, section 4.2): patch of each cell, 0 … count−1. Patches are connected and never span components;
-/// every component gets at least one. Deterministic in the seed.
+/// k-medoids over the cell graph (paper, section 4.2): the patch of each cell, numbered without gaps. Patches are connected and never span
+/// components. There are `count` of them, or as many as there are connected parts if that is more, or cells if that is fewer. Deterministic in the
+/// seed. INVALID_ARGUMENT for no cells or a count below 1.
 absl::StatusOr<std::vector<std::int32_t>> ClusterPatches(const geometry::Cells& cells, std::int32_t count, std::uint64_t seed);
 
 struct GuideOptions {
-  std::int32_t points = 6000;
+  std::int32_t points = 6000;  // surface points used a frame; fewer in the first iterations
   std::int32_t iterations = 10;
 };
 
-/// A cheap pass through all frames, outward from the template's, that gives every window its start.
+/// A cheap pass through all frames, outward from the template's, that gives every window its start. Frames ascend; missing ones are interpolated and
+/// marked. INVALID_ARGUMENT when no frame can be followed.
 absl::StatusOr<geometry::PoseTrack> Guide(const geometry::Template& model, const std::vector<Observation>& frames, const GuideOptions& options,
                                           const base::Progress& progress);
 
@@ -44,7 +46,8 @@ struct TrackOptions {
   absl::Status Validate() const;
 };
 
-/// One window (paper, section 4.5): poses of all its frames and their mean pose, from the guide's start. `start` holds every frame of `window`.
+/// One window (paper, section 4.5): poses of all its frames and their mean pose, from the guide's start. `start` holds every
+/// frame of `window`; its other frames have no influence. Frames that are missing or have no points are interpolated and marked.
 absl::StatusOr<geometry::PoseTrack> TrackWindow(const geometry::Template& model, const std::vector<Observation>& window,
                                                 const geometry::PoseTrack& start, const TrackOptions& options, const base::Progress& progress);
 
