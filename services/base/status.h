@@ -14,6 +14,7 @@ absl::Status Annotate(const absl::Status& status, std::string_view context);
 
 }  // namespace vorocast::base
 
+// NOLINTBEGIN(bugprone-macro-parentheses): a declaration and a return value cannot stand in parentheses.
 /// Returns the status of `expression` from the calling function unless it is OK.
 #define RETURN_IF_ERROR(expression)                                         \
   do {                                                                      \
@@ -29,3 +30,4 @@ absl::Status Annotate(const absl::Status& status, std::string_view context);
 
 /// ASSIGN_OR_RETURN(auto points, ReadPoints(path)); returns the error, or assigns the value.
 #define ASSIGN_OR_RETURN(target, expression) VOROCAST_ASSIGN_OR_RETURN(VOROCAST_CONCAT(status_or_, __LINE__), target, expression)
+// NOLINTEND(bugprone-macro-parentheses)

@@ -111,7 +111,7 @@ struct World::Bodies {
   /// What Bullet's contacts leave undone for cells on the ground. A few iterations cannot carry a heap on a light cell: what is left below
   /// the ground is put back on it. And lumps are not balls: their corners take the turning out of them, or they would roll away for ever.
   void SettleOnGround(double dt) {
-    constexpr float kSlop = 0.1F;          // Bullet units that contacts may work with
+    constexpr float kSlop = 0.1F;           // Bullet units that contacts may work with
     constexpr double kRollingDecay = 25.0;  // 1/s
     const auto kept_turning = static_cast<float>(std::exp(-kRollingDecay * dt));
     const float ground_height = ground_shape->getPlaneConstant();

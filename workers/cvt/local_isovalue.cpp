@@ -48,9 +48,7 @@ class CoarseMeans {
     const float* r01 = r00 + nodes_[2];
     const float* r10 = r00 + nodes_[1] * nodes_[2];
     const float* r11 = r10 + nodes_[2];
-    const auto coarse = [&](std::size_t k) {
-      return (1 - tx) * ((1 - ty) * r00[k] + ty * r01[k]) + tx * ((1 - ty) * r10[k] + ty * r11[k]);
-    };
+    const auto coarse = [&](std::size_t k) { return (1 - tx) * ((1 - ty) * r00[k] + ty * r01[k]) + tx * ((1 - ty) * r10[k] + ty * r11[k]); };
     float low = coarse(1);
     for (std::int32_t k = 0; k < count; k += 2) {
       const float high = coarse(static_cast<std::size_t>(k / 2) + 2);

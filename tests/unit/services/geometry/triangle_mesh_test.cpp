@@ -7,9 +7,7 @@ namespace vorocast::geometry {
 namespace {
 
 /// A tetrahedron with right angles at the origin and legs of one metre: volume 1/6, area 3/2 + √3/2.
-TriangleMesh CornerTetrahedron() {
-  return {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}}, {}};
-}
+TriangleMesh CornerTetrahedron() { return {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}}, {}}; }
 
 TEST(TriangleMesh, VolumeAndAreaOfATetrahedron) {
   EXPECT_NEAR(SignedVolume(CornerTetrahedron()), 1.0 / 6, 1e-15);
