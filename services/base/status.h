@@ -13,7 +13,6 @@ namespace vorocast::base {
 absl::Status Annotate(const absl::Status& status, std::string_view context);
 
 }  // namespace vorocast::base
-
 // NOLINTBEGIN(bugprone-macro-parentheses): a declaration and a return value cannot stand in parentheses.
 /// Returns the status of `expression` from the calling function unless it is OK.
 #define RETURN_IF_ERROR(expression)                                         \
