@@ -12,6 +12,7 @@
 #include <sstream>
 
 #include <fmt/format.h>
+#include "services/base/spawn_attributes.h"
 
 namespace vorocast::fleet {
 namespace {
@@ -42,20 +43,9 @@ absl::StatusOr<ProcessId> StartProcess(const std::vector<std::string>& arguments
   posix_spawn_file_actions_addopen(&files, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
   posix_spawn_file_actions_addopen(&files, STDOUT_FILENO, log.c_str(), O_WRONLY | O_CREAT | O_APPEND, 0644);
   posix_spawn_file_actions_adddup2(&files, STDOUT_FILENO, STDERR_FILENO);
-  posix_spawnattr_t attributes;
-  posix_spawnattr_init(&attributes);
-  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP | POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
-  posix_spawnattr_setpgroup(&attributes, 0);
-  sigset_t none;
-  sigemptyset(&none);
-  posix_spawnattr_setsigmask(&attributes, &none);
-  sigset_t standard;
-  sigemptyset(&standard);
-  for (const int signal : {SIGTERM, SIGINT, SIGPIPE}) sigaddset(&standard, signal);
-  posix_spawnattr_setsigdefault(&attributes, &standard);
+  const base::SpawnAttributes attributes;
   ProcessId process;
-  const int result = posix_spawn(&process.pid, argv[0], &files, &attributes, argv.data(), environ);
-  posix_spawnattr_destroy(&attributes);
+  const int result = posix_spawn(&process.pid, argv[0], &files, attributes.get(), argv.data(), environ);
   posix_spawn_file_actions_destroy(&files);
   if (result != 0) return absl::UnavailableError(fmt::format("{}: cannot be started: {}", arguments[0], std::strerror(result)));
   process.start_time = StartTime(process.pid);

@@ -20,6 +20,7 @@
 
 #include <fmt/format.h>
 #include "services/base/check.h"
+#include "services/base/spawn_attributes.h"
 
 namespace vorocast::lease {
 namespace {
@@ -54,25 +55,13 @@ absl::StatusOr<pid_t> Spawn(const ChildCommand& command, int input, int output, 
   posix_spawn_file_actions_adddup2(&files, error, STDERR_FILENO);
   posix_spawn_file_actions_addclosefrom_np(&files, STDERR_FILENO + 1);
 
-  posix_spawnattr_t attributes;
-  posix_spawnattr_init(&attributes);
-  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP | POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
-  posix_spawnattr_setpgroup(&attributes, 0);
-  sigset_t none;
-  sigemptyset(&none);
-  posix_spawnattr_setsigmask(&attributes, &none);
-  sigset_t defaults;
-  sigemptyset(&defaults);
-  for (const int signal : {SIGPIPE, SIGTERM, SIGINT}) sigaddset(&defaults, signal);
-  posix_spawnattr_setsigdefault(&attributes, &defaults);
-
+  const base::SpawnAttributes attributes;
   std::vector<char*> arguments = {const_cast<char*>(command.program.c_str())};
   for (const std::string& argument : command.arguments) arguments.push_back(const_cast<char*>(argument.c_str()));
   arguments.push_back(nullptr);
   pid_t pid = 0;
-  const int failure = ::posix_spawn(&pid, command.program.c_str(), &files, &attributes, arguments.data(), environ);
+  const int failure = ::posix_spawn(&pid, command.program.c_str(), &files, attributes.get(), arguments.data(), environ);
   posix_spawn_file_actions_destroy(&files);
-  posix_spawnattr_destroy(&attributes);
   if (failure != 0) return absl::InternalError(fmt::format("{}: cannot be started: {}", command.program.string(), std::strerror(failure)));
   return pid;
 }

@@ -13,6 +13,7 @@
 #include <fmt/format.h>
 #include "services/base/processor.h"
 #include "services/lease/drain_signals.h"
+#include "services/lease/lease_flags.h"
 #include "services/lease/lease_loop.h"
 #include "services/rpc/server.h"
 #include "services/simulation/simulate_executor.h"
@@ -71,23 +72,13 @@ int main(int argc, char** argv) {
   base::RequireProcessor();
   CLI::App app(kStory, "vorocast-simulation");
   Options options;
-  double drain_seconds = absl::ToDoubleSeconds(options.lease.drain_time);
   app.add_option("--scheduler", options.lease.scheduler, "Takes tasks from here: HOST:PORT or unix:/PATH")->envname("VOROCAST_SCHEDULER");
   CLI::Option* listen =
       app.add_option("--listen", options.listen, "Answers gRPC here: HOST:PORT, port 0 for any free one, or unix:/PATH. The address is printed");
   CLI::Option* store = app.add_option("--store", options.store, "The artifact folder for runs asked for over --listen");
   listen->needs(store);
-  app.add_option("--slots", options.lease.slots, "Simulations at once, from each side")
-      ->check(CLI::Range(1, lease::kSlotsMax))
-      ->capture_default_str();
-  app.add_option("--name", options.lease.name, "Name among the workers; host, process number and start time if not given");
-  app.add_option("--drain-time", drain_seconds, "Seconds that running simulations get after SIGTERM before they are given back")
-      ->check(CLI::Range(0.0, 86400.0))
-      ->capture_default_str();
-  double leave_after_seconds = 0;
-  app.add_option("--leave-after", leave_after_seconds, "Leaves by itself when the scheduler has been away for so many seconds (0: never)")
-      ->check(CLI::Range(0.0, 1e7))
-      ->capture_default_str();
+  lease::LeaseFlags flags;
+  flags.AddTo(app, options.lease, "Simulations at once, from each side");
   CLI::App* execute_task = app.add_subcommand("execute-task", "Runs one task given on standard input; the program starts this itself");
   CLI11_PARSE(app, argc, argv);
 
@@ -100,10 +91,7 @@ int main(int argc, char** argv) {
     fmt::print(stderr, "vorocast-simulation: nothing to do; give --scheduler, --listen, or both\n");
     return EXIT_FAILURE;
   }
-  std::error_code error;
-  options.lease.program = std::filesystem::read_symlink("/proc/self/exe", error);
-  options.lease.drain_time = absl::Seconds(drain_seconds);
-  if (leave_after_seconds > 0) options.lease.leave_after = absl::Seconds(leave_after_seconds);
+  flags.Apply(options.lease);
   const absl::Status status = Serve(options);
   if (status.ok()) return EXIT_SUCCESS;
   fmt::print(stderr, "vorocast-simulation: {}\n", std::string(status.message()));

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 #include "services/base/processor.h"
+#include "services/lease/lease_flags.h"
 #include "services/lease/lease_loop.h"
 #include "workers/agent/executors.h"
 
@@ -27,27 +28,16 @@ int main(int argc, char** argv) {
   CLI::App app(kStory, "vorocast-worker");
   lease::LeaseLoopOptions options;
   options.slots = static_cast<std::int32_t>(std::max(1u, std::thread::hardware_concurrency()));
-  double drain_seconds = absl::ToDoubleSeconds(options.drain_time);
   app.add_option("--scheduler", options.scheduler, "The scheduler's address: HOST:PORT or unix:/PATH")->envname("VOROCAST_SCHEDULER");
-  app.add_option("--slots", options.slots, "Tasks at once")->check(CLI::Range(1, lease::kSlotsMax))->capture_default_str();
-  app.add_option("--name", options.name, "Name among the workers; host, process number and start time if not given");
-  app.add_option("--drain-time", drain_seconds, "Seconds that running tasks get after SIGTERM before they are given back")
-      ->check(CLI::Range(0.0, 86400.0))
-      ->capture_default_str();
-  double leave_after_seconds = 0;
-  app.add_option("--leave-after", leave_after_seconds, "Leaves by itself when the scheduler has been away for so many seconds (0: never)")
-      ->check(CLI::Range(0.0, 1e7))
-      ->capture_default_str();
+  lease::LeaseFlags flags;
+  flags.AddTo(app, options, "Tasks at once");
   CLI::App* execute_task = app.add_subcommand("execute-task", "Runs one task given on standard input; the worker starts this itself");
   CLI11_PARSE(app, argc, argv);
 
   const std::vector<std::unique_ptr<lease::Executor>> executors = agent::AllExecutors();
   if (execute_task->parsed()) return lease::ExecuteTaskMain(executors);
 
-  std::error_code error;
-  options.program = std::filesystem::read_symlink("/proc/self/exe", error);
-  options.drain_time = absl::Seconds(drain_seconds);
-  if (leave_after_seconds > 0) options.leave_after = absl::Seconds(leave_after_seconds);
+  flags.Apply(options);
   std::vector<tasks::Kind> kinds;
   for (const auto& executor : executors) kinds.push_back(executor->kind());
   const absl::Status status = lease::RunLeaseLoop(options, kinds);
