@@ -4,8 +4,8 @@
 #include <algorithm>
 
 #include "services/base/check.h"
+#include "services/geometry/polygon.h"
 #include "services/rendering/palette.h"
-#include "services/rendering/polygon.h"
 #include "services/rendering/subjects.h"
 
 namespace vorocast::rendering {
@@ -52,7 +52,7 @@ void AppendCell(const CellsPicture& picture, std::size_t cell, double shrink, Tr
       corners.push_back(pose * (centroid + shrink * (cells.vertices[static_cast<std::size_t>(v)] - centroid)));
     const bool is_skin = cells.neighbour[static_cast<std::size_t>(face)] < 0;
     const Vec3f tint = is_skin ? Vec3f((1 - kSkinWhite) * colour + Vec3f::Constant(kSkinWhite)) : Vec3f(kCutDark * colour);
-    for (const auto& triangle : Triangulate(corners)) {
+    for (const auto& triangle : geometry::Triangulate(corners)) {
       for (std::int32_t i : triangle) mesh.corners.push_back(corners[static_cast<std::size_t>(i)].cast<float>());
       mesh.colours.push_back(tint);
     }

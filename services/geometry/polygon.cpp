@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
-#include "services/rendering/polygon.h"
+#include "services/geometry/polygon.h"
 
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
-namespace vorocast::rendering {
+namespace vorocast::geometry {
 namespace {
-
-using geometry::Vec3;
 
 struct Point2 {
   double x, y;
@@ -78,4 +76,4 @@ std::vector<std::array<std::int32_t, 3>> Triangulate(std::span<const Vec3> corne
   return triangles;
 }
 
-}  // namespace vorocast::rendering
+}  // namespace vorocast::geometry

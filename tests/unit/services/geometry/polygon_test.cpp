@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
-#include "services/rendering/polygon.h"
+#include "services/geometry/polygon.h"
 
 #include <gtest/gtest.h>
 
@@ -7,10 +7,8 @@
 
 #include "services/base/random.h"
 
-namespace vorocast::rendering {
+namespace vorocast::geometry {
 namespace {
-
-using geometry::Vec3;
 
 Vec3 AreaVector(const std::vector<Vec3>& corners) {
   Vec3 area = Vec3::Zero();
@@ -64,4 +62,4 @@ TEST(Triangulate, SurvivesPolygonsWithoutArea) {
 }
 
 }  // namespace
-}  // namespace vorocast::rendering
+}  // namespace vorocast::geometry
