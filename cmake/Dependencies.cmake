@@ -17,8 +17,11 @@ find_package(CGAL REQUIRED)
 find_package(embree 3 REQUIRED)
 find_package(HDF5 REQUIRED COMPONENTS C)
 pkg_check_modules(FFTW3 REQUIRED IMPORTED_TARGET fftw3f fftw3)
+pkg_check_modules(TINYGLTF REQUIRED IMPORTED_TARGET tinygltf)
+pkg_check_modules(ASSIMP REQUIRED IMPORTED_TARGET assimp)  # tests: opens what is exported
 pkg_check_modules(BULLET REQUIRED IMPORTED_TARGET bullet)
 pkg_check_modules(SQLITE REQUIRED IMPORTED_TARGET sqlite3)
+pkg_check_modules(POSTGRES REQUIRED IMPORTED_TARGET libpq)
 find_library(TETGEN_LIBRARY tet REQUIRED)
 
 # CGAL asks for -frounding-math wherever it is linked, which slows the kernels beside it: only the sources that include CGAL need it

@@ -9,13 +9,13 @@ packages=(
   # messages
   libgrpc++-dev libprotobuf-dev protobuf-compiler protobuf-compiler-grpc libabsl-dev
   # geometry, kernels, physics, pictures
-  libeigen3-dev libcgal-dev libtet1.5-dev libfftw3-dev libbullet-dev libembree-dev libtbb-dev libpng-dev libdraco-dev libnanoflann-dev
+  libeigen3-dev libcgal-dev libtet1.5-dev libfftw3-dev libbullet-dev libembree-dev libtbb-dev libpng-dev libdraco-dev libnanoflann-dev libtinygltf-dev
   # storage and state
-  libhdf5-dev libsqlite3-dev libssl-dev
+  libhdf5-dev libsqlite3-dev libpq-dev libssl-dev
   # everyday libraries
   libspdlog-dev libfmt-dev libcli11-dev nlohmann-json3-dev
   # tests, benchmarks, checks
-  libgtest-dev libgmock-dev python3 python3-h5py clang-format-14 clang-tidy-14
+  postgresql postgresql-client libgtest-dev libgmock-dev python3 python3-h5py python3-vtk9 libassimp-dev clang-format-14 clang-tidy-14
 )
 
 missing=()

@@ -10,5 +10,6 @@ void AddRunCommands(CLI::App& program, int& exit_code);      // run, demo
 void AddServiceCommands(CLI::App& program, int& exit_code);  // serve, worker
 void AddJobCommands(CLI::App& program, int& exit_code);      // submit, status, watch, explain, cancel, retry, fetch
 void AddCaptureCommands(CLI::App& program, int& exit_code);  // inspect, synth
+void AddExportCommand(CLI::App& program, int& exit_code);    // export
 
 }  // namespace vorocast::client

@@ -56,6 +56,8 @@ absl::StatusOr<geometry::TrackedTake> ReadTrackedTake(const std::filesystem::pat
 
 absl::Status WriteSimulatedTake(const std::filesystem::path& path, const geometry::SimulatedTake& take, const Provenance& provenance);
 absl::StatusOr<geometry::SimulatedTake> ReadSimulatedTake(const std::filesystem::path& path);
+/// Whether the artifact is a simulated.h5; format and version checked.
+absl::StatusOr<bool> HoldsSimulatedTake(const std::filesystem::path& path);
 
 /// Opens the file, checks its format version, and checks that every dataset can be read whole. Used before a result is published.
 absl::Status CheckArtifact(const std::filesystem::path& path);

@@ -101,4 +101,9 @@ absl::StatusOr<SimulatedTake> ReadSimulatedTake(const std::filesystem::path& pat
   return take;
 }
 
+absl::StatusOr<bool> HoldsSimulatedTake(const std::filesystem::path& path) {
+  ASSIGN_OR_RETURN(const std::string content, ReadContent(path));
+  return content == kSimulatedContent;
+}
+
 }  // namespace vorocast::storage

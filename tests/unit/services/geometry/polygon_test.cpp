@@ -43,7 +43,7 @@ TEST(Triangulate, CoversRandomStarsInSpace) {
   base::Random random(3);
   for (int round = 0; round < 300; ++round) {
     const auto n = 4 + random.Below(12);
-    const geometry::Quat rotation(random.Gaussian(), random.Gaussian(), random.Gaussian(), random.Gaussian());
+    const Quat rotation(random.Gaussian(), random.Gaussian(), random.Gaussian(), random.Gaussian());
     std::vector<Vec3> corners;
     for (std::uint64_t i = 0; i < n; ++i) {
       const double angle = 2 * std::numbers::pi * static_cast<double>(i) / static_cast<double>(n);
