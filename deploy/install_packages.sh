@@ -14,6 +14,8 @@ packages=(
   libhdf5-dev libsqlite3-dev libpq-dev libssl-dev
   # everyday libraries
   libspdlog-dev libfmt-dev libcli11-dev nlohmann-json3-dev
+  # peers that benchmarks measure beside
+  voro++-dev libceres-dev
   # tests, benchmarks, checks
   postgresql postgresql-client libgtest-dev libgmock-dev python3 python3-h5py python3-vtk9 libassimp-dev clang-format-14 clang-tidy-14
 )

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "tests/bench/bench_report.h"
 
+#include <cstdio>
 #include <cstdlib>
 #include <ctime>
 #include <filesystem>
@@ -42,14 +43,20 @@ BenchReport::BenchReport(int argc, char** argv) {
 }
 
 void BenchReport::Add(BenchCase bench_case) {
-  fmt::print("{:<18} CPU {:.4g} s{}\n", bench_case.name, bench_case.cpu_s, Named(bench_case.quality));
-  if (!bench_case.goal.empty()) fmt::print("{:<18}{}\n", "  goal", Named(bench_case.goal));
+  fmt::print("{:<22} CPU {:.4g} s{}{}\n", bench_case.name, bench_case.cpu_s, Named(bench_case.quality),
+             bench_case.input.empty() ? "" : fmt::format("  ({})", bench_case.input));
+  if (!bench_case.goal.empty()) fmt::print("{:<22}{}\n", "  goal", Named(bench_case.goal));
   if (!bench_case.peer.empty()) {
-    fmt::print("{:<18} {}{}{}\n", "  peer", bench_case.peer, bench_case.peer_cpu_s ? fmt::format(": CPU {:.4g} s", *bench_case.peer_cpu_s) : "",
+    fmt::print("{:<22} {}{}{}\n", "  peer", bench_case.peer, bench_case.peer_cpu_s ? fmt::format(": CPU {:.4g} s", *bench_case.peer_cpu_s) : "",
                Named(bench_case.peer_quality));
   }
   std::fflush(stdout);
   cases_.push_back(std::move(bench_case));
+}
+
+void BenchReport::Skip(const std::string& name, const std::string& reason) const {
+  fmt::print("{:<22} skipped: {}\n", name, reason);
+  std::fflush(stdout);
 }
 
 absl::Status BenchReport::Write() const {
@@ -57,6 +64,7 @@ absl::Status BenchReport::Write() const {
   nlohmann::json list = nlohmann::json::array();
   for (const BenchCase& one : cases_) {
     list.push_back({{"case", one.name},
+                    {"input", one.input},
                     {"cpu_s", one.cpu_s},
                     {"quality", one.quality},
                     {"goal", one.goal},

@@ -12,7 +12,8 @@ namespace vorocast::bench {
 
 // One figure of one kernel: what it cost on one core, how good its result is, what was aimed at, and what another program needs for the same work.
 struct BenchCase {
-  std::string name;  // "cvt-5000-10": kernel, size, iterations
+  std::string name;   // "cvt-5000-10": kernel, size, iterations
+  std::string input;  // what it was measured on: "crane 0, 65386 points, 1 mm noise"
   double cpu_s = 0;
   std::map<std::string, double> quality;  // "g3", "mean_mm", "p95_mm", "drift_mm", …; units are in the name
   std::map<std::string, double>
@@ -36,6 +37,8 @@ class BenchReport {
 
   const std::vector<std::string>& arguments() const { return arguments_; }
   void Add(BenchCase bench_case);
+  /// Says that cases cannot be measured here and why; that is no failure.
+  void Skip(const std::string& name, const std::string& reason) const;
 
   // Errors: UNKNOWN, the file could not be written.
   absl::Status Write() const;

@@ -1,113 +1,91 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
-// The indicator beside its peer, CGAL's Poisson on the same points and grid, in one run: CPU time and distances to the points and the truth.
-// Usage: bench_indicator [points] [crane frame]. Prints the ratio to the peer and to the goal.
-#include <fmt/format.h>
-
+// The indicator beside its peer, CGAL's Poisson function and a surface cut from it on the same grid, in one run: CPU time and distances of both
+// surfaces to the points and to the truth.
+//   bench_indicator [POINTS] [CRANE_FRAME] [--json FILE]
 #include <algorithm>
 #include <cstdlib>
-#include <ctime>
-#include <numbers>
 #include <string>
-#include <vector>
 
-#include "tests/unit/workers/cvt/indicator_scenes.h"
+#include <fmt/format.h>
+
+#include "tests/bench/bench_inputs.h"
+#include "tests/bench/bench_report.h"
+#include "tests/bench/surface_distance.h"
 #include "workers/cvt/indicator.h"
 
-namespace vorocast::cvt {
+namespace vorocast::bench {
 namespace {
 
-using geometry::OrientedPoints;
-using geometry::TriangleMesh;
-using geometry::Vec3;
-
 constexpr double kGoalSeconds = 0.3;
-constexpr double kNoise = 0.001;
 
-double CpuSeconds() {
-  timespec time{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-}
-
-struct Row {
-  double seconds = 0;
-  scenes::Distances points, truth, surface;
+struct Made {
+  double cpu_s = 0;
+  std::map<std::string, double> quality;
 };
 
-/// The least of `runs` runs: the machine's other work only ever adds.
-Row Run(const OrientedPoints& points, const TriangleMesh* truth, IndicatorMethod method, int runs) {
-  Row row;
-  row.seconds = 1e9;
-  absl::StatusOr<Shape> shape;
+void AddDistances(const std::string& name, const geometry::TriangleMesh& surface, const std::vector<geometry::Vec3>& points, Made& made) {
+  const SurfaceDistances distances = DistancesTo(surface, points);
+  made.quality[name + "_mean_mm"] = 1000 * distances.mean;
+  made.quality[name + "_p95_mm"] = 1000 * distances.p95;
+}
+
+/// The time is the least of `runs`: the machine's other work only ever adds.
+absl::StatusOr<Made> Make(const BenchFrame& frame, cvt::IndicatorMethod method, int runs) {
+  Made made;
+  cvt::Shape shape;
   for (int run = 0; run < runs; ++run) {
-    const double start = CpuSeconds();
-    shape = ShapeFromPoints(points, {.method = method}, nullptr);
-    row.seconds = std::min(row.seconds, CpuSeconds() - start);
+    const double begin = CpuSeconds();
+    ASSIGN_OR_RETURN(shape, cvt::ShapeFromPoints(frame.points, {.method = method}, nullptr));
+    const double cpu_s = CpuSeconds() - begin;
+    made.cpu_s = run == 0 ? cpu_s : std::min(made.cpu_s, cpu_s);
   }
-  if (!shape.ok()) {
-    fmt::print("{}\n", std::string(shape.status().message()));
-    std::exit(1);
+  AddDistances("points_to_surface", shape.surface, frame.points.positions, made);
+  if (frame.truth) {
+    AddDistances("truth_to_surface", shape.surface, geometry::SampleSurface(*frame.truth, 50'000, 2).positions, made);
+    AddDistances("surface_to_truth", *frame.truth, geometry::SampleSurface(shape.surface, 50'000, 3).positions, made);
   }
-  const scenes::DistanceTo to_surface(shape->surface);
-  row.points = scenes::Measure(points.positions, to_surface);
-  if (truth != nullptr) {
-    row.truth = scenes::Measure(geometry::SampleSurface(*truth, 50'000, 2).positions, to_surface);
-    row.surface = scenes::Measure(geometry::SampleSurface(shape->surface, 50'000, 3).positions, scenes::DistanceTo(*truth));
-  }
-  return row;
+  return made;
 }
 
-void Print(const char* name, const Row& row) {
-  const auto pair = [](const scenes::Distances& d) {
-    return d.mean > 0 ? fmt::format("{:6.3f} {:7.3f}", 1000 * d.mean, 1000 * d.percentile95) : fmt::format("{:>6} {:>7}", "-", "-");
-  };
-  fmt::print("{:<20} {:7.3f}   {}   {}   {}\n", name, row.seconds, pair(row.points), pair(row.truth), pair(row.surface));
+absl::Status Compare(const std::string& name, const BenchFrame& frame, BenchReport& report) {
+  ASSIGN_OR_RETURN(const Made ours, Make(frame, cvt::IndicatorMethod::kSpectral, 3));
+  ASSIGN_OR_RETURN(const Made theirs, Make(frame, cvt::IndicatorMethod::kCgal, 1));
+  BenchCase one;
+  one.name = name;
+  one.input = fmt::format("{}, {} points{}", frame.name, frame.points.size(), frame.truth ? ", 1 mm noise" : "");
+  one.cpu_s = ours.cpu_s;
+  one.quality = ours.quality;
+  one.goal["cpu_s"] = kGoalSeconds;
+  // As precise as CGAL's; what is known to be true comes first.
+  const std::string precision = frame.truth ? "truth_to_surface_mean_mm" : "points_to_surface_mean_mm";
+  one.goal[precision] = theirs.quality.at(precision);
+  one.peer = "CGAL 5.5 Poisson function, sampled on the same grid";
+  one.peer_cpu_s = theirs.cpu_s;
+  one.peer_quality = theirs.quality;
+  report.Add(std::move(one));
+  return absl::OkStatus();
 }
 
-void Compare(const std::string& title, const OrientedPoints& points, const TriangleMesh* truth) {
-  fmt::print("\n{}: {} points\n{:<20} {:>7}   {:<14}   {:<14}   {:<14}\n", title, points.size(), "mm: mean, 95 %", "CPU s", "points",
-             "truth->surface", "surface->truth");
-  const Row fast = Run(points, truth, IndicatorMethod::kSpectral, 3);
-  const Row cgal = Run(points, truth, IndicatorMethod::kCgal, 1);
-  Print("spectral", fast);
-  Print("CGAL Poisson", cgal);
-  fmt::print("time / CGAL's {:.3f}, time / goal {:.2f}, distance to the points / CGAL's {:.3f}\n", fast.seconds / cgal.seconds,
-             fast.seconds / kGoalSeconds, fast.points.mean / cgal.points.mean);
-}
-
-/// A figure-sized shape that needs no capture: a wavy torus standing upright.
-TriangleMesh WavyTorus() {
-  constexpr std::int32_t kAround = 400;
-  constexpr std::int32_t kAcross = 120;
-  TriangleMesh mesh;
-  for (std::int32_t i = 0; i < kAround; ++i) {
-    for (std::int32_t j = 0; j < kAcross; ++j) {
-      const double u = 2 * std::numbers::pi * i / kAround;
-      const double v = 2 * std::numbers::pi * j / kAcross;
-      const double tube = 0.12 + 0.02 * std::sin(9 * u) * std::cos(3 * v);
-      const double ring = 0.75 + tube * std::cos(v);
-      mesh.vertices.emplace_back(ring * std::cos(u), ring * std::sin(u), tube * std::sin(v));
-      const auto at = [&](std::int32_t a, std::int32_t b) { return (i + a) % kAround * kAcross + (j + b) % kAcross; };
-      mesh.triangles.push_back({at(0, 0), at(1, 0), at(1, 1)});
-      mesh.triangles.push_back({at(0, 0), at(1, 1), at(0, 1)});
-    }
+absl::Status Bench(BenchReport& report) {
+  const auto& arguments = report.arguments();
+  const std::size_t count = !arguments.empty() ? std::strtoul(arguments[0].c_str(), nullptr, 10) : kPaperPoints;
+  const int number = arguments.size() > 1 ? std::atoi(arguments[1].c_str()) : 40;
+  ASSIGN_OR_RETURN(const BenchFrame frame, CraneOrSynthFrame(number, count));
+  RETURN_IF_ERROR(Compare("indicator-65k", frame, report));
+  if (const auto kinoptic = KinopticFrame(395); kinoptic.ok()) {
+    RETURN_IF_ERROR(Compare("indicator-kinoptic", *kinoptic, report));
+  } else {
+    report.Skip("indicator-kinoptic", std::string(kinoptic.status().message()));
   }
-  return mesh;
+  return report.Write();
 }
 
 }  // namespace
-}  // namespace vorocast::cvt
+}  // namespace vorocast::bench
 
 int main(int argc, char** argv) {
-  using namespace vorocast::cvt;
-  const std::size_t count = argc > 1 ? std::strtoul(argv[1], nullptr, 10) : 65'386;
-  const int frame = argc > 2 ? std::atoi(argv[2]) : 40;
-  const auto torus = WavyTorus();
-  Compare("wavy torus, 1 mm noise", scenes::Scan(torus, count, kNoise, 1), &torus);
-  if (const auto crane = scenes::Crane(frame)) {
-    Compare(fmt::format("crane frame {}, 1 mm noise", frame), scenes::Scan(*crane, count, kNoise, 1), &*crane);
-  } else {
-    fmt::print("no crane capture in {}; set VOROCAST_DATA\n", scenes::DataFolder().string());
-  }
-  if (const auto kinoptic = scenes::Kinoptic(395)) Compare("kinoptic frame 395 (no truth)", *kinoptic, nullptr);
+  vorocast::bench::BenchReport report(argc, argv);
+  const absl::Status status = vorocast::bench::Bench(report);
+  if (!status.ok()) fmt::print(stderr, "bench_indicator: {}\n", std::string(status.message()));
+  return status.ok() ? 0 : 1;
 }
