@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 // Tracking against known motion, as a user would run it: every frame made into cells (10 iterations), a template (50), the guide, windows, assembly.
-// Prints how far material points are from where they truly went, and CPU seconds a frame, beside the goals.
-// Usage: bench_tracking [dancer|crane] [first:last] [template frame]. `crane` is looked for in ../shared/data (VOROCAST_DATA overrides).
+// Prints how far material points are from where they truly went, and CPU seconds a frame, beside the goals; then one frame's poses beside Ceres.
+// Usage: bench_tracking [dancer|crane] [first:last] [template frame] [--json FILE]. `crane` is looked for in ../shared/data (VOROCAST_DATA
+// overrides); it is the default where it is there.
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -9,8 +10,8 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
-#include <ctime>
 #include <filesystem>
+#include <map>
 #include <numeric>
 #include <set>
 #include <string>
@@ -20,6 +21,8 @@
 #include "services/capture/frame_reader.h"
 #include "services/storage/truth.h"
 #include "services/synth/synth.h"
+#include "tests/bench/bench_report.h"
+#include "tests/bench/tracking_ceres.h"
 #include "workers/cvt/indicator.h"
 #include "workers/cvt/tessellate.h"
 #include "workers/tracking/tracking.h"
@@ -27,6 +30,7 @@
 namespace vorocast::tracking {
 namespace {
 
+using bench::CpuSeconds;
 using geometry::Vec3;
 
 constexpr double kGoalMeanMm = 2;
@@ -38,12 +42,6 @@ constexpr std::size_t kPoints = 65'000;
 constexpr double kNoise = 0.001;
 constexpr std::int32_t kWindow = 10;
 constexpr std::int32_t kOverlap = 3;
-
-double CpuSeconds() {
-  timespec time{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-}
 
 template <typename T>
 T OrExit(absl::StatusOr<T> result) {
@@ -66,8 +64,7 @@ struct KnownTake {
 };
 
 KnownTake Crane(const Range& range) {
-  const char* data = std::getenv("VOROCAST_DATA");
-  const std::filesystem::path folder = data != nullptr ? data : VOROCAST_SOURCE_DIR "/../shared/data";
+  const std::filesystem::path folder = bench::DataFolder();
   KnownTake take;
   for (std::int32_t f = range.first; f < range.last; ++f) {
     const auto raw = OrExit(capture::ReadRawFrame(folder / "crane" / fmt::format("frame_{:04}.ply", f)));
@@ -136,7 +133,8 @@ std::vector<std::size_t> SeenPoints(const std::vector<Vec3>& points, const geome
   return seen;
 }
 
-void PrintErrors(const char* name, const geometry::TrackedTake& take, const KnownTake& known, double seconds) {
+/// Prints a line and returns its figures.
+std::map<std::string, double> PrintErrors(const char* name, const geometry::TrackedTake& take, const KnownTake& known, double seconds) {
   const auto row = static_cast<std::size_t>(std::ranges::find(take.patches.frames, take.model.frame) - take.patches.frames.begin());
   const std::vector<std::size_t> seen = SeenPoints(known.truth[row], known.frames[row].surface);
   std::vector<Vec3> points;
@@ -149,9 +147,12 @@ void PrintErrors(const char* name, const geometry::TrackedTake& take, const Know
   std::ranges::sort(errors);
   const auto& residual = take.patches.residual;
   const double frames = static_cast<double>(known.truth.size());
-  fmt::print("{:<10} {:8.2f} {:8.2f} {:8.2f} {:8.2f}  {:9.2f}  {:9.4f}\n", name, std::accumulate(errors.begin(), errors.end(), 0.0) / errors.size(),
-             errors[errors.size() / 2], errors[errors.size() * 95 / 100], errors.back(),
-             1000 * std::accumulate(residual.begin(), residual.end(), 0.0) / frames, seconds / frames);
+  const double mean = std::accumulate(errors.begin(), errors.end(), 0.0) / static_cast<double>(errors.size());
+  const double median = errors[errors.size() / 2];
+  const double high = errors[errors.size() * 95 / 100];
+  const double residual_mm = 1000 * std::accumulate(residual.begin(), residual.end(), 0.0) / frames;
+  fmt::print("{:<10} {:8.2f} {:8.2f} {:8.2f} {:8.2f}  {:9.2f}  {:9.4f}\n", name, mean, median, high, errors.back(), residual_mm, seconds / frames);
+  return {{"mean_mm", mean}, {"median_mm", median}, {"p95_mm", high}, {"max_mm", errors.back()}, {"residual_mm", residual_mm}};
 }
 
 std::vector<geometry::PoseTrack> TrackWindows(const geometry::Template& model, const KnownTake& take, const geometry::PoseTrack& guide) {
@@ -165,7 +166,7 @@ std::vector<geometry::PoseTrack> TrackWindows(const geometry::Template& model, c
   }
 }
 
-void Run(KnownTake take, std::int32_t template_frame) {
+void Run(const std::string& what, KnownTake take, std::int32_t template_frame, bench::BenchReport& report) {
   double start = CpuSeconds();
   const auto lap = [&] {
     const double before = start;
@@ -187,11 +188,26 @@ void Run(KnownTake take, std::int32_t template_frame) {
   const double track_seconds = lap();
   const auto tracked = OrExit(Assemble(model, windows, options));
   const double assemble_seconds = lap();
-  PrintErrors("windows", tracked, take, track_seconds);
+  bench::BenchCase result;
+  result.quality = PrintErrors("windows", tracked, take, track_seconds);
   const double seconds = (guide_seconds + track_seconds + assemble_seconds) / static_cast<double>(take.frames.size());
   fmt::print("{:<10} {:8.2f} {:>8} {:8.2f} {:>8}  {:>9}  {:9.4f}\n", "goal", kGoalMeanMm, "", kGoalHighMm, "", "", kGoalSeconds);
   fmt::print("all of it {:.4f} s a frame, {:.2f} of the goal; windows of {} share {} frames, which are tracked twice\n", seconds,
              seconds / kGoalSeconds, kWindow, kOverlap);
+  result.name = "tracking-65k";
+  result.input = fmt::format("{}, frames {} to {}, {} points, 1 mm noise, {} cells, {} patches; seconds a frame, guide and assembly included", what,
+                             take.frames.front().frame, take.frames.back().frame, kPoints, model.cells.size(), model.patch_count);
+  result.cpu_s = seconds;
+  result.goal = {{"cpu_s", kGoalSeconds}, {"mean_mm", kGoalMeanMm}, {"p95_mm", kGoalHighMm}};
+  report.Add(std::move(result));
+
+  // From the pose of the frame before, as far as one frame moves.
+  const std::size_t middle = take.frames.size() / 2;
+  std::vector<geometry::Rigid3> before;
+  for (std::int32_t k = 0; k < model.patch_count; ++k) {
+    before.push_back(tracked.patches.Pose(middle > 0 ? middle - 1 : 0, static_cast<std::size_t>(k)));
+  }
+  bench::CompareWithCeres(model, take.frames[middle], before, report);
 }
 
 }  // namespace
@@ -199,16 +215,23 @@ void Run(KnownTake take, std::int32_t template_frame) {
 
 int main(int argc, char** argv) {
   using vorocast::tracking::Range;
-  const std::string what = argc > 1 ? argv[1] : "dancer";
+  vorocast::bench::BenchReport report(argc, argv);
+  const auto& arguments = report.arguments();
+  const bool crane_is_there = std::filesystem::exists(std::filesystem::path(vorocast::bench::DataFolder()) / "crane");
+  const std::string what = !arguments.empty() ? arguments[0] : crane_is_there ? "crane" : "dancer";
   Range range;
-  if (argc > 2 && std::sscanf(argv[2], "%d:%d", &range.first, &range.last) != 2) return fmt::print(stderr, "frames are given as first:last\n"), 1;
-  const std::int32_t template_frame = argc > 3 ? std::atoi(argv[3]) : range.first;
+  if (arguments.size() > 1 && std::sscanf(arguments[1].c_str(), "%d:%d", &range.first, &range.last) != 2) {
+    return fmt::print(stderr, "frames are given as first:last\n"), 1;
+  }
+  const std::int32_t template_frame = arguments.size() > 2 ? std::atoi(arguments[2].c_str()) : range.first;
   if (range.first < 0 || range.last <= range.first || template_frame < range.first || template_frame >= range.last) {
     return fmt::print(stderr, "the template's frame must be one of {}:{}\n", range.first, range.last), 1;
   }
   if (what != "dancer" && what != "crane") return fmt::print(stderr, "'{}' is neither dancer nor crane\n", what), 1;
   fmt::print("{}, {} points a frame, {} mm noise, template frame {}\n", what, vorocast::tracking::kPoints, 1000 * vorocast::tracking::kNoise,
              template_frame);
-  vorocast::tracking::Run(what == "crane" ? vorocast::tracking::Crane(range) : vorocast::tracking::Dancer(range), template_frame);
-  return 0;
+  vorocast::tracking::Run(what, what == "crane" ? vorocast::tracking::Crane(range) : vorocast::tracking::Dancer(range), template_frame, report);
+  const absl::Status written = report.Write();
+  if (!written.ok()) fmt::print(stderr, "bench_tracking: {}\n", std::string(written.message()));
+  return written.ok() ? 0 : 1;
 }
