@@ -45,6 +45,7 @@ void AppendCell(const CellsPicture& picture, std::size_t cell, double shrink, Tr
   const Rigid3 pose = PoseOf(picture, cell);
   const Vec3f colour = ColourOf(picture, cell);
   const Vec3 centroid = cells.centroid[cell];
+  if (!picture.scale.empty()) shrink *= picture.scale[cell];
   std::vector<Vec3> corners;
   for (std::int64_t face = cells.face_offset[cell]; face < cells.face_offset[cell + 1]; ++face) {
     corners.clear();
@@ -91,6 +92,8 @@ absl::Status CheckPicture(const CellsPicture& picture) {
   }
   if (!picture.state.empty() && picture.state.size() != n)
     return absl::InvalidArgumentError(fmt::format("{} cells have {} states", n, picture.state.size()));
+  if (!picture.scale.empty() && picture.scale.size() != n)
+    return absl::InvalidArgumentError(fmt::format("{} cells have {} scales", n, picture.scale.size()));
   for (std::size_t cell = 0; cell < picture.world_from_template.size(); ++cell) {
     const Rigid3& pose = picture.world_from_template[cell];
     if (!pose.translation.allFinite() || !pose.rotation.coeffs().allFinite()) {

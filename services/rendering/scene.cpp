@@ -61,12 +61,17 @@ void AttachDiscs(RTCDevice device, RTCScene scene, const std::vector<Disc>& disc
 
 void AttachTriangles(RTCDevice device, RTCScene scene, const Triangles& mesh, unsigned int id) {
   RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-  auto* corners = NewBuffer<std::array<float, 3>>(geometry, RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT3, mesh.corners.size());
-  auto* indices = NewBuffer<std::array<std::uint32_t, 3>>(geometry, RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3, mesh.colours.size());
-  if (corners != nullptr && indices != nullptr) {
-    for (std::size_t i = 0; i < mesh.corners.size(); ++i) corners[i] = {mesh.corners[i].x(), mesh.corners[i].y(), mesh.corners[i].z()};
-    for (std::uint32_t i = 0; i < mesh.colours.size(); ++i) indices[i] = {3 * i, 3 * i + 1, 3 * i + 2};
+  const bool moves = !mesh.corners_at_close.empty();
+  if (moves) rtcSetGeometryTimeStepCount(geometry, 2);
+  for (const unsigned int step : {0U, 1U}) {
+    if (step == 1 && !moves) break;
+    const std::vector<Vec3f>& from = step == 0 ? mesh.corners : mesh.corners_at_close;
+    auto* corners = static_cast<std::array<float, 3>*>(
+        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, step, RTC_FORMAT_FLOAT3, sizeof(std::array<float, 3>), from.size()));
+    for (std::size_t i = 0; corners != nullptr && i < from.size(); ++i) corners[i] = {from[i].x(), from[i].y(), from[i].z()};
   }
+  auto* indices = NewBuffer<std::array<std::uint32_t, 3>>(geometry, RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3, mesh.colours.size());
+  for (std::uint32_t i = 0; indices != nullptr && i < mesh.colours.size(); ++i) indices[i] = {3 * i, 3 * i + 1, 3 * i + 2};
   Attach(scene, geometry, id);
   rtcReleaseGeometry(geometry);
 }
@@ -77,6 +82,7 @@ RTCRay ToEmbree(const Ray& ray) {
   result.dir_x = ray.direction.x(), result.dir_y = ray.direction.y(), result.dir_z = ray.direction.z();
   result.tnear = 0;
   result.tfar = ray.reach;
+  result.time = ray.time;
   result.mask = ~0U;
   return result;
 }
@@ -124,9 +130,11 @@ absl::StatusOr<Scene> Scene::Build(const std::vector<Disc>& discs, const std::ve
     if (!meshes[i].colours.empty()) AttachTriangles(tree->device.get(), tree->scene.get(), meshes[i], static_cast<unsigned int>(i + 1));
     tree->mesh_colours.push_back(meshes[i].colours);
     tree->mesh_metal.push_back(meshes[i].metal);
-    for (const Vec3f& corner : meshes[i].corners) {
-      tree->low = tree->low.cwiseMin(corner);
-      tree->high = tree->high.cwiseMax(corner);
+    for (const std::vector<Vec3f>* corners : {&meshes[i].corners, &meshes[i].corners_at_close}) {
+      for (const Vec3f& corner : *corners) {
+        tree->low = tree->low.cwiseMin(corner);
+        tree->high = tree->high.cwiseMax(corner);
+      }
     }
   }
   tree->discs = discs;
@@ -155,8 +163,10 @@ std::optional<Hit> Scene::Intersect(const Ray& ray) const {
     return hit;
   }
   hit.normal = Vec3f(query.hit.Ng_x, query.hit.Ng_y, query.hit.Ng_z).normalized();
-  hit.colour = tree_->mesh_colours[query.hit.geomID - 1][query.hit.primID];
-  hit.metal = tree_->mesh_metal[query.hit.geomID - 1];
+  hit.mesh = query.hit.geomID - 1;
+  hit.triangle = query.hit.primID;
+  hit.colour = tree_->mesh_colours[hit.mesh][hit.triangle];
+  hit.metal = tree_->mesh_metal[hit.mesh];
   hit.clearance = kTriangleClearance;
   return hit;
 }

@@ -22,8 +22,9 @@ struct Disc {
 
 /// Triangles that share no vertices: three consecutive corners each, counter-clockwise seen from outside.
 struct Triangles {
-  std::vector<geometry::Vec3f> corners;  // [3t]
-  std::vector<geometry::Vec3f> colours;  // [t]
+  std::vector<geometry::Vec3f> corners;           // [3t]
+  std::vector<geometry::Vec3f> corners_at_close;  // [3t] where they are when the shutter closes, or empty: they stand still
+  std::vector<geometry::Vec3f> colours;           // [t]
   bool metal = false;
 };
 
@@ -31,13 +32,16 @@ struct Ray {
   geometry::Vec3f origin;
   geometry::Vec3f direction;  // unit
   float reach = 0;            // metres
+  float time = 0;             // 0 the shutter opens, 1 it closes
 };
 
 struct Hit {
   float distance = 0;
   geometry::Vec3f normal;  // unit, outward as its surface says
   geometry::Vec3f colour;
-  float clearance = 0;  // secondary rays start this far above the surface, so that they miss its own roughness
+  std::uint32_t mesh = 0;      // in the order of Build; discs have none
+  std::uint32_t triangle = 0;  // of the mesh
+  float clearance = 0;         // secondary rays start this far above the surface, so that they miss its own roughness
   bool metal = false;
 };
 

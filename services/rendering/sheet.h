@@ -35,6 +35,7 @@ struct CellsPicture {
   const std::vector<std::int32_t>* patch = nullptr;
   std::vector<geometry::Rigid3> world_from_template;  // [n], or empty for the identity
   std::vector<geometry::CellState> state;             // [n], or empty: kGone cells are not drawn
+  std::vector<float> scale;                           // [n] size about the centroid, or empty: as they are
   std::vector<std::pair<const geometry::TriangleMesh*, geometry::Rigid3>> objects;
   std::string label;
 };
