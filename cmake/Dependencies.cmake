@@ -20,6 +20,8 @@ pkg_check_modules(FFTW3 REQUIRED IMPORTED_TARGET fftw3f fftw3)
 pkg_check_modules(TINYGLTF REQUIRED IMPORTED_TARGET tinygltf)
 pkg_check_modules(ASSIMP REQUIRED IMPORTED_TARGET assimp)  # tests: opens what is exported
 pkg_check_modules(BULLET REQUIRED IMPORTED_TARGET bullet)
+pkg_check_modules(OPENEXR REQUIRED IMPORTED_TARGET OpenEXR)
+pkg_check_modules(MURMURHASH REQUIRED IMPORTED_TARGET libmurmurhash)
 pkg_check_modules(SQLITE REQUIRED IMPORTED_TARGET sqlite3)
 pkg_check_modules(POSTGRES REQUIRED IMPORTED_TARGET libpq)
 find_library(TETGEN_LIBRARY tet REQUIRED)
