@@ -22,9 +22,6 @@ constexpr double kVolumeTolerance = 1e-9;
 /// Cells grow by this when they turn out to reach further than was computed.
 constexpr double kReachGrowth = 1.3;
 
-/// Bisectors this little beyond a point are compared exactly; all others are surely further.
-constexpr double kSafety = 1 - 1e-9;
-
 /// A plane's mark in a set of planes; several may share one, so a set says only which corners to look at.
 std::uint64_t Bit(std::int32_t plane) { return std::uint64_t{1} << (plane & 63); }
 
@@ -90,14 +87,14 @@ std::int32_t ClippedCells::Walk(const Vec3& point, std::int32_t start) const {
   double at_squared = SquaredDistance(point, sites_[at]);
   for (;;) {
     const VoronoiDiagram::Cell& cell = diagram_.cell(at);
-    if (at_squared < cell.inner_squared * kSafety) return at;
     const Vec3 seen = point - sites_[at];
+    if (!diagram_.AnyPlaneNear(cell, seen)) return at;
     const auto planes = diagram_.planes(cell);
     const auto names = diagram_.names(cell);
     std::int32_t next = at;
     double next_squared = at_squared;
     for (std::size_t p = 0; p < planes.size(); ++p) {
-      if (planes[p].p.dot(seen) < planes[p].square * kSafety || names[p] < 0) continue;
+      if (planes[p].p.dot(seen) < planes[p].square * VoronoiDiagram::kSafety || names[p] < 0) continue;
       const double squared = SquaredDistance(point, sites_[names[p]]);
       if (squared < next_squared || (squared == next_squared && names[p] < next)) next = names[p], next_squared = squared;
     }
@@ -140,6 +137,7 @@ bool ClippedCells::FindNearestSites() {
 
 bool ClippedCells::AddSurface() {
   queued_in_.assign(sites_.size(), -1);
+  cuts_.Start();
   for (std::int32_t t = 0; t < static_cast<std::int32_t>(solid_.triangles.size()); ++t) {
     const auto& [a, b, c] = solid_.triangles[t];
     const std::int32_t site = nearest_[a];
@@ -147,11 +145,40 @@ bool ClippedCells::AddSurface() {
       // Cells are convex: all of the triangle lies in the cell.
       moments_[site].AddCone(solid_.vertices[a] - sites_[site], solid_.vertices[b] - sites_[site], solid_.vertices[c] - sites_[site]);
       boundary_[site] = 1;
+    } else if ((nearest_[b] != site || nearest_[c] != site) && cuts_.Cut(t, nearest_, complex_ != nullptr, &cut_)) {
+      AddCut(t, cut_);
     } else if (!AddTriangle(t)) {
       return false;
     }
   }
   return true;
+}
+
+void ClippedCells::AddCut(std::int32_t triangle, const TriangleCut& cut) {
+  for (std::int32_t k = 0; k < cut.piece_count; ++k) {
+    const TriangleCut::Piece& piece = cut.pieces[k];
+    const std::int32_t n = piece.corner_count;
+    const Vec3& site = sites_[piece.site];
+    boundary_[piece.site] = 1;
+    std::array<Vec3, 6> from_site;
+    for (std::int32_t c = 0; c < n; ++c) from_site[c] = piece.corners[c].position - site;
+    Moments& sum = moments_[piece.site];
+    for (std::int32_t c = 1; c + 1 < n; ++c) sum.AddCone(from_site[0], from_site[c], from_site[c + 1]);
+    for (std::int32_t c = 0; c < n; ++c) {
+      // The same edge bounds, the other way round, the part of the cell's face that lies in the solid.
+      const std::int32_t across = piece.corners[c].across;
+      if (across < 0) continue;
+      const Vec3 p = (sites_[across] - site) / 2;
+      sum.AddFaceEdge(p, p.squaredNorm(), from_site[c + 1 == n ? 0 : c + 1], from_site[c], 1);
+    }
+    if (cut.has_inner_corner) {
+      crossings_.push_back({piece.site, piece.corners[n - 2].across, piece.corners[n - 1].across, triangle, from_site[n - 1]});
+    }
+    if (complex_) {
+      complex_->pieces.push_back({piece.site, triangle, static_cast<std::int64_t>(complex_->corners.size()), n});
+      complex_->corners.insert(complex_->corners.end(), piece.corners.begin(), piece.corners.begin() + n);
+    }
+  }
 }
 
 /// Visits the cells that the triangle meets, from those nearest to its vertices across the bisectors that cut it.
@@ -215,7 +242,7 @@ void ClippedCells::KeepPiece(std::int32_t triangle, std::int32_t site) {
   complex_->pieces.push_back({site, triangle, static_cast<std::int64_t>(complex_->corners.size()), static_cast<std::int32_t>(piece_.size)});
   for (std::size_t k = 0; k < piece_.size; ++k) {
     const SurfacePiece::Corner& corner = piece_.corners[k];
-    complex_->corners.push_back({clipper_.Key(corner), clipper_.Position(corner), corner.edge >= 0 ? names[corner.edge] : -1});
+    complex_->corners.push_back({clipper_.Position(corner), clipper_.Key(corner), corner.edge >= 0 ? names[corner.edge] : -1});
   }
 }
 

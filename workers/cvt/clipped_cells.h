@@ -9,6 +9,7 @@
 #include "services/geometry/vector.h"
 #include "workers/cvt/moments.h"
 #include "workers/cvt/solid.h"
+#include "workers/cvt/surface_cuts.h"
 #include "workers/cvt/surface_pieces.h"
 #include "workers/cvt/voronoi_diagram.h"
 
@@ -25,11 +26,7 @@ struct EdgeCrossing {
 
 /// Everything the polyhedra are assembled from, when asked for.
 struct ClippedComplex {
-  struct Corner {
-    VertexKey key;
-    geometry::Vec3 position;
-    std::int32_t across;  // the site across the edge to the next corner, or −1 where it lies on a side of the triangle
-  };
+  using Corner = TriangleCut::Corner;
   struct Piece {
     std::int32_t cell;
     std::int32_t triangle;
@@ -52,7 +49,8 @@ struct ClippedComplex {
 class ClippedCells {
  public:
   /// Keeps a reference to the solid.
-  ClippedCells(const Solid& solid, Neighbours neighbours) : solid_(solid), neighbours_(neighbours), clipper_(solid, sites_, diagram_) {}
+  ClippedCells(const Solid& solid, Neighbours neighbours)
+      : solid_(solid), neighbours_(neighbours), clipper_(solid, sites_, diagram_), cuts_(solid, sites_, diagram_) {}
   ClippedCells(const ClippedCells&) = delete;
   ClippedCells& operator=(const ClippedCells&) = delete;
 
@@ -72,6 +70,7 @@ class ClippedCells {
   bool FindNearestSites();
   std::int32_t Walk(const geometry::Vec3& point, std::int32_t start) const;
   bool AddSurface();
+  void AddCut(std::int32_t triangle, const TriangleCut& cut);
   bool AddTriangle(std::int32_t triangle);
   bool AddPiece(std::int32_t triangle, std::int32_t site);
   void KeepPiece(std::int32_t triangle, std::int32_t site);
@@ -100,6 +99,8 @@ class ClippedCells {
   std::vector<geometry::Vec3> sites_;  // as clipped
   ClippedComplex* complex_ = nullptr;
   TriangleClipper clipper_;
+  SurfaceCuts cuts_;
+  TriangleCut cut_;
   std::vector<EdgeCrossing> crossings_;
   std::vector<std::int64_t> crossing_begin_;
   std::vector<std::int32_t> queued_in_;  // [n] the triangle whose queue last held the site

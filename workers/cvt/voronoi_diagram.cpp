@@ -16,6 +16,9 @@ constexpr double kFirstReach = 1.0;
 /// Side of the grid's boxes, in spacings: fewer boxes to look at against more sites in each.
 constexpr double kGridSide = 1.4;
 
+/// Of the planes that pad.
+constexpr std::int32_t kNoName = std::numeric_limits<std::int32_t>::min();
+
 }  // namespace
 
 bool VoronoiDiagram::Build(const std::vector<Vec3>& sites, double spacing, Neighbours neighbours) {
@@ -26,8 +29,8 @@ bool VoronoiDiagram::Build(const std::vector<Vec3>& sites, double spacing, Neigh
   planes_.clear();
   names_.clear();
   corners_.clear();
-  planes_.reserve(16 * sites.size());
-  names_.reserve(16 * sites.size());
+  planes_.reserve(18 * sites.size());
+  names_.reserve(18 * sites.size());
   corners_.reserve(28 * sites.size());
   sites_ = sites;
   grid_.Build(sites_, kGridSide * spacing);
@@ -113,6 +116,10 @@ void VoronoiDiagram::Store(std::int32_t site, double reach) {
     planes_.push_back(work_.plane(p));
     names_.push_back(work_.name(p));
     cell.truncated = cell.truncated || work_.name(p) < 0;
+  }
+  while (planes_.size() % 4 != 0) {
+    planes_.push_back({Vec3::Zero(), 1});
+    names_.push_back(kNoName);
   }
   for (std::int32_t i = 0; i < work_.corner_count(); ++i) {
     const ConvexCell::Corner& from = work_.corner(i);

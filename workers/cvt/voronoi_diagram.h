@@ -7,6 +7,7 @@
 
 #include "services/geometry/vector.h"
 #include "workers/cvt/convex_cell.h"
+#include "workers/cvt/lanes.h"
 #include "workers/cvt/site_grid.h"
 #include "workers/cvt/tessellate.h"
 
@@ -48,6 +49,16 @@ class VoronoiDiagram {
   std::span<const Corner> corners(const Cell& cell) const {
     return {corners_.data() + cell.corner_begin, static_cast<std::size_t>(cell.corner_count)};
   }
+  /// Bisectors this little beyond a point are compared exactly; all others are surely further.
+  static constexpr double kSafety = 1 - 1e-9;
+  /// The planes of a cell (its reach's too) that a point, seen from the site, lies beyond, on, or too near to for rounding to tell.
+  struct Hits {
+    std::int64_t count = 0;
+    std::int64_t index_sum = 0;  // of their indices: the index, when there is one
+  };
+  Hits PlanesNear(const Cell& cell, const geometry::Vec3& seen) const;
+  bool AnyPlaneNear(const Cell& cell, const geometry::Vec3& seen) const;
+
   const SiteGrid& grid() const { return grid_; }
   std::size_t size() const { return cells_.size(); }
 
@@ -63,12 +74,42 @@ class VoronoiDiagram {
   std::vector<std::int32_t> seen_;                // [n] the site that last tried this one as a neighbour
 
   std::vector<Cell> cells_;
-  std::vector<HalfSpace> planes_;
-  std::vector<std::int32_t> names_;
+  std::vector<HalfSpace> planes_;    // each cell's padded to a multiple of 4 by such as nothing lies beyond
+  std::vector<std::int32_t> names_;  // as planes_
   std::vector<Corner> corners_;
   std::vector<Cell> last_cells_;
   std::vector<std::int32_t> last_names_;
   std::vector<std::vector<std::int32_t>> delaunay_;  // with Neighbours::kTetGen
 };
+
+/// How far beyond four planes a point lies, times |p|; `point` is x, y, z and the factor of |p|² with its sign changed.
+inline Lanes BeyondPlanes(const HalfSpace* planes, const Lanes& point) {
+  static_assert(sizeof(HalfSpace) == 4 * sizeof(double));
+  const double* at = planes->p.data();
+  return SumsOf(LoadLanes(at) * point, LoadLanes(at + 4) * point, LoadLanes(at + 8) * point, LoadLanes(at + 12) * point);
+}
+
+inline VoronoiDiagram::Hits VoronoiDiagram::PlanesNear(const Cell& cell, const geometry::Vec3& seen) const {
+  const Lanes point{seen.x(), seen.y(), seen.z(), -kSafety};
+  LaneMask index{0, 1, 2, 3};
+  LaneMask count{};
+  LaneMask index_sum{};
+  const HalfSpace* planes = planes_.data() + cell.plane_begin;
+  for (std::int32_t p = 0; p < cell.plane_count; p += 4) {
+    const LaneMask near = BeyondPlanes(planes + p, point) >= 0.0;
+    count -= near;
+    index_sum += near & index;
+    index += 4;
+  }
+  return {SumOf(count), SumOf(index_sum)};
+}
+
+inline bool VoronoiDiagram::AnyPlaneNear(const Cell& cell, const geometry::Vec3& seen) const {
+  const Lanes point{seen.x(), seen.y(), seen.z(), -kSafety};
+  Lanes highest = Splat(-1);
+  const HalfSpace* planes = planes_.data() + cell.plane_begin;
+  for (std::int32_t p = 0; p < cell.plane_count; p += 4) highest = Max(highest, BeyondPlanes(planes + p, point));
+  return HighestOf(highest) >= 0;
+}
 
 }  // namespace vorocast::cvt
