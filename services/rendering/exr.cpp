@@ -29,8 +29,10 @@ namespace {
 
 using geometry::Vec3f;
 
-constexpr int kLevels = 3;  // of Cryptomatte: two ranks each
+constexpr std::size_t kLevels = 3;  // of Cryptomatte: two ranks each
+constexpr std::size_t kRanks = 2 * kLevels;
 constexpr double kPixelsMax = 2e8;
+constexpr int kZipLevel = 1;  // a third of the default level's time for files a fifth larger
 
 /// One part of the file: channels that stand in memory one after another, each a plane of its own.
 class Part {
@@ -40,6 +42,7 @@ class Part {
     header_.setName(name);
     header_.setType(Imf::SCANLINEIMAGE);
     header_.compression() = Imf::ZIP_COMPRESSION;
+    header_.zipCompressionLevel() = kZipLevel;
   }
   Imf::Header& header() { return header_; }
 
@@ -98,22 +101,20 @@ void AddVector(Part& part, const std::string& layer, const char* axes, const Vec
   for (int axis = 0; axis < 3; ++axis) part.Half(layer + "." + axes[axis], [&](std::size_t i) { return vectors[i][axis]; });
 }
 
-/// Pairs of id and coverage of one layer, in the ranks' order.
-using Ranks = std::vector<std::array<std::pair<float, float>, 2 * kLevels>>;
-
-void AddCryptomatte(Part& part, const std::string& layer, const std::vector<std::string>& names, const Ranks& ranks) {
+/// `rank(i, r)`: id and coverage of the r-th largest thing in pixel i, (0, 0) where there is none.
+template <typename Rank>
+void AddCryptomatte(Part& part, const std::string& layer, const std::vector<std::string>& names, Rank rank) {
   const CryptomatteMetadata metadata = MakeMetadata(layer, names);
   part.header().insert(metadata.prefix + "name", Imf::StringAttribute(metadata.name));
   part.header().insert(metadata.prefix + "hash", Imf::StringAttribute("MurmurHash3_32"));
   part.header().insert(metadata.prefix + "conversion", Imf::StringAttribute("uint32_to_float32"));
   part.header().insert(metadata.prefix + "manifest", Imf::StringAttribute(metadata.manifest));
-  for (int level = 0; level < kLevels; ++level) {
+  for (std::size_t level = 0; level < kLevels; ++level) {
     const std::string prefix = fmt::format("{}{:02}.", layer, level);
-    const auto first = static_cast<std::size_t>(2 * level);
-    part.Float(prefix + "R", [&](std::size_t i) { return ranks[i][first].first; });
-    part.Float(prefix + "G", [&](std::size_t i) { return ranks[i][first].second; });
-    part.Float(prefix + "B", [&](std::size_t i) { return ranks[i][first + 1].first; });
-    part.Float(prefix + "A", [&](std::size_t i) { return ranks[i][first + 1].second; });
+    part.Float(prefix + "R", [&](std::size_t i) { return rank(i, 2 * level).first; });
+    part.Float(prefix + "G", [&](std::size_t i) { return rank(i, 2 * level).second; });
+    part.Float(prefix + "B", [&](std::size_t i) { return rank(i, 2 * level + 1).first; });
+    part.Float(prefix + "A", [&](std::size_t i) { return rank(i, 2 * level + 1).second; });
   }
 }
 
@@ -136,39 +137,25 @@ class Names {
   std::vector<float> ids_;
 };
 
-/// Ranks by cell, objects after the cells.
-Ranks CellRanks(const FilmPicture& picture, const Names& names, std::size_t cells) {
-  Ranks ranks(picture.coverage.size());
-  for (std::size_t i = 0; i < ranks.size(); ++i) {
-    for (std::size_t r = 0; r < ranks[i].size(); ++r) {
-      const FilmPicture::Coverage& covered = picture.coverage[i][r];
-      if (covered.part == 0) continue;
-      const std::size_t index = covered.id >= 0 ? static_cast<std::size_t>(covered.id) : cells + static_cast<std::size_t>(kObjectId - covered.id);
-      ranks[i][r] = {names.Id(index), covered.part};
-    }
-  }
-  return ranks;
-}
+using PixelCoverage = std::array<FilmPicture::Coverage, kRanks>;
 
-/// Ranks by patch: what its cells cover together.
-Ranks PatchRanks(const FilmPicture& picture, const Names& names, const std::vector<std::int32_t>& patch) {
-  Ranks ranks(picture.coverage.size());
-  for (std::size_t i = 0; i < ranks.size(); ++i) {
-    std::array<std::pair<std::int32_t, float>, 2 * kLevels> sums{};
+/// What the cells of each patch cover together, sorted as a picture's coverage is.
+std::vector<PixelCoverage> CoverageByPatch(const FilmPicture& picture, const std::vector<std::int32_t>& patch) {
+  std::vector<PixelCoverage> by_patch(picture.coverage.size());
+  for (std::size_t i = 0; i < by_patch.size(); ++i) {
     std::size_t used = 0;
     for (const FilmPicture::Coverage& covered : picture.coverage[i]) {
       if (covered.part == 0 || covered.id < 0) continue;
       const std::int32_t p = patch[static_cast<std::size_t>(covered.id)];
       std::size_t at = 0;
-      while (at < used && sums[at].first != p) ++at;
-      if (at == used) sums[used++] = {p, 0};
-      sums[at].second += covered.part;
+      while (at < used && by_patch[i][at].id != p) ++at;
+      if (at == used) by_patch[i][used++] = {p, 0};
+      by_patch[i][at].part += covered.part;
     }
-    std::stable_sort(sums.begin(), sums.begin() + static_cast<std::ptrdiff_t>(used),
-                     [](const auto& a, const auto& b) { return a.second > b.second; });
-    for (std::size_t r = 0; r < used; ++r) ranks[i][r] = {names.Id(static_cast<std::size_t>(sums[r].first)), sums[r].second};
+    std::stable_sort(by_patch[i].begin(), by_patch[i].begin() + static_cast<std::ptrdiff_t>(used),
+                     [](const FilmPicture::Coverage& a, const FilmPicture::Coverage& b) { return a.part > b.part; });
   }
-  return ranks;
+  return by_patch;
 }
 
 std::vector<std::string> Numbered(const char* prefix, std::size_t count) {
@@ -223,8 +210,19 @@ std::vector<Part> MakeParts(const FilmPicture& picture, const Camera& camera, co
   const Names cell_names(std::move(cells));
   const Names patch_names(Numbered("patch", patch.empty() ? 0 : static_cast<std::size_t>(*std::ranges::max_element(patch)) + 1));
   Part& crypto = part("crypto");
-  AddCryptomatte(crypto, "CryptoCell", cell_names.all(), CellRanks(picture, cell_names, patch.size()));
-  AddCryptomatte(crypto, "CryptoPatch", patch_names.all(), PatchRanks(picture, patch_names, patch));
+  AddCryptomatte(crypto, "CryptoCell", cell_names.all(), [&](std::size_t i, std::size_t r) {
+    const FilmPicture::Coverage& covered = picture.coverage[i][r];
+    if (covered.part == 0) return std::pair(0.0F, 0.0F);
+    // Scene objects are named after the cells.
+    const std::size_t index =
+        covered.id >= 0 ? static_cast<std::size_t>(covered.id) : patch.size() + static_cast<std::size_t>(kObjectId - covered.id);
+    return std::pair(cell_names.Id(index), covered.part);
+  });
+  const std::vector<PixelCoverage> by_patch = CoverageByPatch(picture, patch);
+  AddCryptomatte(crypto, "CryptoPatch", patch_names.all(), [&](std::size_t i, std::size_t r) {
+    const FilmPicture::Coverage& covered = by_patch[i][r];
+    return covered.part == 0 ? std::pair(0.0F, 0.0F) : std::pair(patch_names.Id(static_cast<std::size_t>(covered.id)), covered.part);
+  });
   return parts;
 }
 

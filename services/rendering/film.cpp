@@ -92,11 +92,19 @@ class PixelSum {
   std::array<Counted, 16> counted_{};  // a pixel with more pieces than this loses the smallest ones
 };
 
+/// Where a pixel takes many camera rays, each sends on fewer.
+struct Lights {
+  StudioLight even;
+  StudioLight refined;
+};
+
+int RefinedSamples(const FilmQuality& quality) { return std::min(kRefinedSamplesMax, kRefined * quality.samples); }
+
 class FilmCamera {
  public:
-  FilmCamera(const FilmScene& scene, const StudioLight& light, const Camera& camera, const FilmQuality& quality, double seconds_per_picture)
+  FilmCamera(const FilmScene& scene, const Lights& lights, const Camera& camera, const FilmQuality& quality, double seconds_per_picture)
       : scene_(scene),
-        light_(light),
+        lights_(lights),
         camera_(camera),
         quality_(quality),
         seconds_(seconds_per_picture),
@@ -123,13 +131,12 @@ class FilmCamera {
     const Jitter jitter(column, row);
     PixelSum sum;
     const std::size_t at = At(column, row);
-    const int refined = std::min(kRefinedSamplesMax, kRefined * quality_.samples);
-    AddRays(blurred_[at] ? refined : quality_.samples, column, row, jitter, sum);
-    if (!sum.IsOfOnePiece()) AddRays(refined - sum.rays(), column, row, jitter, sum);
+    if (!blurred_[at]) AddRays(lights_.even, quality_.samples, column, row, jitter, sum);
+    if (blurred_[at] || !sum.IsOfOnePiece()) AddRays(lights_.refined, RefinedSamples(quality_) - sum.rays(), column, row, jitter, sum);
     picture.rgba[at] = sum.Rgba();
     picture.shadow[at] = sum.Shadow();
-    picture.coverage[at] = sum.Coverage();
     if (!sum.HasHit()) return;
+    picture.coverage[at] = sum.Coverage();
     const Hit& hit = sum.nearest();
     const Ray middle = camera_.Through(static_cast<float>(column) + 0.5F, static_cast<float>(row) + 0.5F, kFar);
     const Vec3f point = middle.origin + sum.depth() / middle.direction.dot(camera_.forward) * middle.direction;
@@ -161,13 +168,13 @@ class FilmCamera {
     }
   }
 
-  void AddRays(int count, std::int32_t column, std::int32_t row, const Jitter& jitter, PixelSum& sum) const {
+  void AddRays(const StudioLight& light, int count, std::int32_t column, std::int32_t row, const Jitter& jitter, PixelSum& sum) const {
     for (int i = 0; i < count; ++i) {
       const int k = sum.rays();
       const auto lens = LensPoint(k, jitter);
       Ray ray = camera_.Through(static_cast<float>(column) + lens[0], static_cast<float>(row) + lens[1], kFar);
       ray.time = quality_.shutter > 0 ? ShutterTime(k, jitter) : 0;
-      const Seen seen = light_.Look(ray, k, jitter);
+      const Seen seen = light.Look(ray, k, jitter);
       sum.Add(seen, seen.hit ? scene_.IdOf(*seen.hit) : 0, seen.hit ? seen.hit->distance * ray.direction.dot(camera_.forward) : 0);
     }
   }
@@ -184,7 +191,7 @@ class FilmCamera {
   }
 
   const FilmScene& scene_;
-  const StudioLight& light_;
+  const Lights& lights_;
   const Camera& camera_;
   const FilmQuality& quality_;
   double seconds_;
@@ -211,9 +218,11 @@ absl::StatusOr<FilmPicture> RenderFilmPicture(const FilmSubject& subject, const 
                                               const base::Progress& progress) {
   RETURN_IF_ERROR(Check(camera, quality));
   ASSIGN_OR_RETURN(const FilmScene scene, FilmScene::Build(subject, quality.shutter > 0));
-  const LightRays rays{.samples = quality.samples, .sky = 3, .key_ground = 2, .key_surface = 1};
-  const StudioLight light(scene.rays(), camera, studio, rays);
-  FilmCamera film(scene, light, camera, quality, subject.seconds_per_picture);
+  const Lights lights = {
+      StudioLight(scene.rays(), camera, studio, {.samples = quality.samples, .sky = 3, .key_ground = 3, .key_surface = 1}),
+      StudioLight(scene.rays(), camera, studio, {.samples = RefinedSamples(quality), .sky = 1, .key_ground = 1, .key_surface = 1}),
+  };
+  FilmCamera film(scene, lights, camera, quality, subject.seconds_per_picture);
   film.FindBlur();
   FilmPicture picture;
   picture.width = camera.width;

@@ -143,6 +143,9 @@ absl::StatusOr<Scene> Scene::Build(const std::vector<Disc>& discs, const std::ve
   return Scene(std::move(tree));
 }
 
+const Vec3f& Scene::low() const { return tree_->low; }
+const Vec3f& Scene::high() const { return tree_->high; }
+
 std::optional<Hit> Scene::Intersect(const Ray& ray) const {
   if (tree_->Misses(ray)) return std::nullopt;
   RTCRayHit query{};

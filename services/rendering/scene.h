@@ -54,6 +54,9 @@ class Scene {
   Scene& operator=(Scene&&) noexcept;
   ~Scene();
 
+  /// Corners of the box around everything at any time; the lower above the upper one when there is nothing.
+  const geometry::Vec3f& low() const;
+  const geometry::Vec3f& high() const;
   std::optional<Hit> Intersect(const Ray& ray) const;
   bool Occludes(const Ray& ray) const;
 

@@ -47,6 +47,7 @@ class StudioLight {
 
  private:
   geometry::Vec3f Surface(const Ray& ray, const Hit& hit, int sample, const Jitter& jitter) const;
+  bool IsFarFromAll(const geometry::Vec3f& from) const;
   geometry::Vec3f Unshadowed(const Ray& ray, const geometry::Vec3f& point, int sample, const Jitter& jitter) const;
   float Key(const Ray& ray, const geometry::Vec3f& from, const geometry::Vec3f& normal, int rays, int sample, const Jitter& jitter) const;
   geometry::Vec3f Sky(const Ray& ray, const geometry::Vec3f& from, const geometry::Vec3f& normal, int sample, const Jitter& jitter) const;
