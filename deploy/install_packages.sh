@@ -9,7 +9,7 @@ packages=(
   # messages
   libgrpc++-dev libprotobuf-dev protobuf-compiler protobuf-compiler-grpc libabsl-dev
   # geometry, kernels, physics, pictures
-  libeigen3-dev libcgal-dev libtet1.5-dev libfftw3-dev libbullet-dev libembree-dev libtbb-dev libpng-dev libopenexr-dev libmurmurhash-dev libdraco-dev libnanoflann-dev libtinygltf-dev
+  libeigen3-dev libcgal-dev libtet1.5-dev libfftw3-dev libbullet-dev libembree-dev libtbb-dev libpng-dev libopenexr-dev libmurmurhash-dev libdraco-dev libnanoflann-dev libtinygltf-dev ffmpeg
   # storage and state
   libhdf5-dev libsqlite3-dev libpq-dev libssl-dev
   # everyday libraries
