@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
-// Scores tessellations from their files alone: evaluate_cells cells.h5 [cells.h5 ...]
+// Scores tessellations from their files alone: evaluate_cells [--json FILE] cells.h5 [cells.h5 ...]
 //
 // Volumes and second moments by exact integration over the stored polyhedra (tetrahedra from the site), G3 from those, whether every cell is
-// closed, and the distances of the captured points to the cells' outer surface (CGAL AABB tree).
+// closed, and the distances of the captured points to the cells' outer surface (CGAL AABB tree). The JSON is a list in the order of the files.
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <filesystem>
+#include <fstream>
 #include <numeric>
 #include <set>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -17,6 +18,7 @@
 #include <CGAL/AABB_triangle_primitive.h>
 #include <CGAL/Simple_cartesian.h>
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "services/storage/hdf5_artifacts.h"
 
@@ -68,7 +70,7 @@ void ScoreCell(const Cells& cells, std::size_t c, Score& score, Triangles& surfa
   if (!closed) ++score.open_cells;
 }
 
-absl::Status Evaluate(const char* path) {
+absl::StatusOr<nlohmann::json> Evaluate(const std::string& path) {
   ASSIGN_OR_RETURN(const Cells cells, storage::ReadCells(path));
   Score score;
   Triangles surface;
@@ -91,22 +93,45 @@ absl::Status Evaluate(const char* path) {
       path, cells.size(), score.boundary_cells, components.size(), cells.iterations, g3, score.volume, score.open_cells, score.volume_difference_max,
       cells.surface.size(), score.distance_sum, 1000 * score.distance_sum / static_cast<double>(std::max<std::size_t>(1, cells.surface.size())),
       1000 * score.distance_max);
-  return absl::OkStatus();
+  return nlohmann::json{{"file", path},
+                        {"cells", cells.size()},
+                        {"g3", g3},
+                        {"volume_m3", score.volume},
+                        {"open_cells", score.open_cells},
+                        {"points", cells.surface.size()},
+                        {"distance_sum_m", score.distance_sum},
+                        {"distance_max_m", score.distance_max}};
 }
 
 }  // namespace
 }  // namespace vorocast
 
 int main(int argc, char** argv) {
-  if (argc < 2) {
-    fmt::print(stderr, "usage: evaluate_cells cells.h5 [cells.h5 ...]\n");
+  std::vector<std::string> paths;
+  std::string json_file;
+  for (int i = 1; i < argc; ++i) {
+    if (std::string(argv[i]) == "--json" && i + 1 < argc) {
+      json_file = argv[++i];
+    } else {
+      paths.emplace_back(argv[i]);
+    }
+  }
+  if (paths.empty()) {
+    fmt::print(stderr, "usage: evaluate_cells [--json FILE] cells.h5 [cells.h5 ...]\n");
     return 2;
   }
-  for (int i = 1; i < argc; ++i) {
-    if (const absl::Status status = vorocast::Evaluate(argv[i]); !status.ok()) {
-      fmt::print(stderr, "evaluate_cells: {}\n", std::string(status.message()));
+  nlohmann::json scores = nlohmann::json::array();
+  for (const std::string& path : paths) {
+    const absl::StatusOr<nlohmann::json> score = vorocast::Evaluate(path);
+    if (!score.ok()) {
+      fmt::print(stderr, "evaluate_cells: {}\n", std::string(score.status().message()));
       return 1;
     }
+    scores.push_back(*score);
+  }
+  if (!json_file.empty() && !(std::ofstream(json_file) << scores.dump(2) << "\n")) {
+    fmt::print(stderr, "evaluate_cells: {} cannot be written\n", json_file);
+    return 1;
   }
   return 0;
 }

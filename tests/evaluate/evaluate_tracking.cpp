@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
-// How far a tracked take is from the truth: evaluate_tracking tracked.h5 truth.h5 [FIRST_FRAME]
+// How far a tracked take is from the truth: evaluate_tracking tracked.h5 truth.h5 [FIRST_FRAME] [--json FILE]
 //
 // The truth's material points at the template's frame are attached to the template's cells and carried along by the stored poses; what is
 // printed is their distance to where the truth says they are. FIRST_FRAME is the truth's row that the take's frame 0 stands for (0).
@@ -7,12 +7,15 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
+#include <fstream>
 #include <limits>
 #include <map>
 #include <numeric>
+#include <string>
 #include <vector>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "services/storage/hdf5_artifacts.h"
 #include "services/storage/truth.h"
@@ -70,7 +73,7 @@ Score ScoreOf(std::vector<double> distances) {
   return {mean, distances[static_cast<std::size_t>(0.95 * static_cast<double>(distances.size() - 1))], distances.back()};
 }
 
-absl::Status Evaluate(const char* tracked_path, const char* truth_path, std::int32_t first_frame) {
+absl::Status Evaluate(const char* tracked_path, const char* truth_path, std::int32_t first_frame, const std::string& json_file) {
   ASSIGN_OR_RETURN(const geometry::TrackedTake take, storage::ReadTrackedTake(tracked_path));
   ASSIGN_OR_RETURN(const storage::Truth truth, storage::ReadTruth(truth_path));
   const std::size_t count = truth.part.size();
@@ -102,6 +105,9 @@ absl::Status Evaluate(const char* tracked_path, const char* truth_path, std::int
   }
   const Score score = ScoreOf(all);
   fmt::print("all: mean {:.2f} mm, 95 % {:.2f} mm, max {:.2f} mm over {} frames\n", score.mean, score.p95, score.max, take.frame_count());
+  const nlohmann::json json = {
+      {"file", tracked_path}, {"frames", take.frame_count()}, {"mean_mm", score.mean}, {"p95_mm", score.p95}, {"max_mm", score.max}};
+  if (!json_file.empty() && !(std::ofstream(json_file) << json.dump(2) << "\n")) return absl::UnknownError(json_file + " cannot be written");
   return absl::OkStatus();
 }
 
@@ -109,11 +115,20 @@ absl::Status Evaluate(const char* tracked_path, const char* truth_path, std::int
 }  // namespace vorocast
 
 int main(int argc, char** argv) {
-  if (argc < 3) {
-    fmt::print(stderr, "usage: evaluate_tracking tracked.h5 truth.h5 [FIRST_FRAME]\n");
+  std::vector<const char*> arguments;
+  std::string json_file;
+  for (int i = 1; i < argc; ++i) {
+    if (std::string(argv[i]) == "--json" && i + 1 < argc) {
+      json_file = argv[++i];
+    } else {
+      arguments.push_back(argv[i]);
+    }
+  }
+  if (arguments.size() < 2) {
+    fmt::print(stderr, "usage: evaluate_tracking tracked.h5 truth.h5 [FIRST_FRAME] [--json FILE]\n");
     return 2;
   }
-  const absl::Status status = vorocast::Evaluate(argv[1], argv[2], argc > 3 ? std::atoi(argv[3]) : 0);
+  const absl::Status status = vorocast::Evaluate(arguments[0], arguments[1], arguments.size() > 2 ? std::atoi(arguments[2]) : 0, json_file);
   if (!status.ok()) fmt::print(stderr, "evaluate_tracking: {}\n", std::string(status.message()));
   return status.ok() ? 0 : 1;
 }
