@@ -32,8 +32,10 @@ double TypicalSeconds(tasks::Kind kind, std::int32_t frames) {
       return 1.1;
     case tasks::Kind::kTemplate:
       return 4;
+    case tasks::Kind::kStretch:
+      return 3;
     case tasks::Kind::kGuide:
-      return 0.15 * frames;
+      return 2 + 0.01 * frames;
     case tasks::Kind::kTrack:
       return 3;
     case tasks::Kind::kAssemble:

@@ -18,6 +18,7 @@ absl::Duration TimeLimit(tasks::Kind kind) {
     case tasks::Kind::kTemplate:
     case tasks::Kind::kSheet:
       return absl::Hours(1);
+    case tasks::Kind::kStretch:
     case tasks::Kind::kTrack:
       return absl::Hours(2);
     case tasks::Kind::kGuide:

@@ -35,6 +35,7 @@ nlohmann::json ToJson(const JobSpec& job) {
           {"patches", job.patches},
           {"window_frames", job.window_frames},
           {"overlap_frames", job.overlap_frames},
+          {"stretch_frames", job.stretch_frames},
           {"interpolated_max", job.interpolated_max},
           {"frames_per_second", job.frames_per_second},
           {"track", tasks::ToJson(job.track)},
@@ -50,6 +51,7 @@ absl::StatusOr<JobSpec> JobSpecFromJson(const nlohmann::json& json) {
   RETURN_IF_ERROR(Read(json, "patches", job.patches));
   RETURN_IF_ERROR(Read(json, "window_frames", job.window_frames));
   RETURN_IF_ERROR(Read(json, "overlap_frames", job.overlap_frames));
+  RETURN_IF_ERROR(Read(json, "stretch_frames", job.stretch_frames));
   RETURN_IF_ERROR(Read(json, "interpolated_max", job.interpolated_max));
   RETURN_IF_ERROR(Read(json, "frames_per_second", job.frames_per_second));
   RETURN_IF_ERROR(ReadOptions(json, "track", job.track));

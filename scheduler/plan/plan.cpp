@@ -2,6 +2,7 @@
 #include "scheduler/plan/plan.h"
 
 #include <algorithm>
+#include <set>
 
 #include <fmt/format.h>
 
@@ -10,6 +11,8 @@ namespace {
 
 constexpr std::int32_t kTemplateIterations = 50;
 constexpr std::int32_t kSheetPictures = 12;
+/// So many frames are looked at for the template: neighbouring ones are alike, and a task that reads them all would hold up a long take.
+constexpr std::size_t kTemplateCandidates = 64;
 constexpr std::string_view kTemplate = "template";
 constexpr std::string_view kGuide = "guide";
 constexpr std::string_view kAssemble = "assemble";
@@ -43,6 +46,14 @@ PlannedTask Tessellate(const JobSpec& job, const PlannedFrame& frame) {
           .output = fmt::format("cells/frame_{:06}.h5", frame.number)};
 }
 
+/// At most so many frames, the first and the last among them, evenly between.
+std::vector<PlannedFrame> Spread(const std::vector<PlannedFrame>& frames, std::size_t most) {
+  if (frames.size() <= most) return frames;
+  std::vector<PlannedFrame> chosen;
+  for (std::size_t i = 0; i < most; ++i) chosen.push_back(frames[i * (frames.size() - 1) / (most - 1)]);
+  return chosen;
+}
+
 PlannedTask Template(const JobSpec& job, const std::vector<PlannedFrame>& frames) {
   tasks::TemplateOptions options{.tessellate = job.tessellate, .frame = job.template_frame, .patches = job.patches};
   options.tessellate.iterations = kTemplateIterations;
@@ -52,26 +63,59 @@ PlannedTask Template(const JobSpec& job, const std::vector<PlannedFrame>& frames
       if (frame.number == job.template_frame) task.inputs.push_back(Blob(frame));
     }
   } else {
-    for (const PlannedFrame& frame : frames) task.inputs.push_back(Blob(frame));
-    for (const PlannedFrame& frame : frames) task.inputs.push_back(CellsOf(frame));
+    const std::vector<PlannedFrame> candidates = Spread(frames, kTemplateCandidates);
+    for (const PlannedFrame& frame : candidates) task.inputs.push_back(Blob(frame));
+    for (const PlannedFrame& frame : candidates) task.inputs.push_back(CellsOf(frame));
   }
   return task;
 }
 
-PlannedTask Guide(const std::vector<PlannedFrame>& frames) {
-  PlannedTask task{.name = std::string(kGuide), .kind = tasks::Kind::kGuide, .options = tasks::ToJson(tasks::GuideOptions{})};
-  task.inputs.push_back(Result("template", std::string(kTemplate)));
-  for (const PlannedFrame& frame : frames) task.inputs.push_back(CellsOf(frame));
+PlannedTask Stretch(const JobSpec& job, const std::vector<PlannedFrame>& frames, WindowRange range) {
+  PlannedTask task{.kind = tasks::Kind::kStretch};
+  task.name = fmt::format("stretch {}-{}: follow", frames[range.first].number, frames[range.last - 1].number);
+  for (std::int32_t i = range.first; i < range.last; ++i) task.inputs.push_back(CellsOf(frames[i]));
+  task.options = tasks::ToJson(tasks::StretchOptions{.patches = job.patches});
   return task;
 }
 
-PlannedTask Track(const JobSpec& job, const std::vector<PlannedFrame>& frames, WindowRange window) {
+/// A take in parts: how its stretches move, and where in the take each lies. A short take has none.
+struct PlannedStretches {
+  std::vector<WindowRange> ranges;
+  std::vector<PlannedTask> tasks;
+};
+
+PlannedStretches Stretches(const JobSpec& job, const std::vector<PlannedFrame>& frames) {
+  PlannedStretches stretches{.ranges = SplitStretches(static_cast<std::int32_t>(frames.size()), job.stretch_frames), .tasks = {}};
+  if (stretches.ranges.size() == 1) return {};
+  for (const WindowRange range : stretches.ranges) stretches.tasks.push_back(Stretch(job, frames, range));
+  return stretches;
+}
+
+/// Coarse poses: of all frames, or where the take's stretches meet.
+PlannedTask Guide(const std::vector<PlannedFrame>& frames, const PlannedStretches& stretches) {
+  PlannedTask task{.name = std::string(kGuide), .kind = tasks::Kind::kGuide, .options = tasks::ToJson(tasks::GuideOptions{})};
+  task.inputs.push_back(Result("template", std::string(kTemplate)));
+  for (const PlannedTask& stretch : stretches.tasks) task.inputs.push_back(Result("stretch", stretch.name));
+  if (stretches.tasks.empty()) {
+    for (const PlannedFrame& frame : frames) task.inputs.push_back(CellsOf(frame));
+  }
+  for (std::size_t s = 1; s < stretches.ranges.size(); ++s) {
+    for (std::int32_t i = stretches.ranges[s].first; i < stretches.ranges[s - 1].last; ++i) task.inputs.push_back(CellsOf(frames[i]));
+  }
+  return task;
+}
+
+PlannedTask Track(const JobSpec& job, const std::vector<PlannedFrame>& frames, const PlannedStretches& stretches, WindowRange window) {
   tasks::TrackOptions options = job.track;
   options.frames.clear();
   PlannedTask task{.kind = tasks::Kind::kTrack};
   task.name = fmt::format("window {}-{}: track", frames[window.first].number, frames[window.last - 1].number);
   task.inputs.push_back(Result("template", std::string(kTemplate)));
   task.inputs.push_back(Result("guide", std::string(kGuide)));
+  for (std::size_t s = 0; s < stretches.tasks.size(); ++s) {
+    const bool overlap = stretches.ranges[s].first < window.last && window.first < stretches.ranges[s].last;
+    if (overlap) task.inputs.push_back(Result("stretch", stretches.tasks[s].name));
+  }
   for (std::int32_t i = window.first; i < window.last; ++i) {
     options.frames.push_back(frames[i].number);
     task.inputs.push_back(CellsOf(frames[i]));
@@ -107,18 +151,10 @@ PlannedTask Sheet(const JobSpec& job, const std::string& stage, std::vector<Plan
           .output = fmt::format("sheets/{}.png", stage)};
 }
 
-/// At most kSheetPictures frames, the first and the last among them, evenly between.
-std::vector<PlannedFrame> SheetFrames(const std::vector<PlannedFrame>& frames) {
-  if (frames.size() <= static_cast<std::size_t>(kSheetPictures)) return frames;
-  std::vector<PlannedFrame> chosen;
-  for (std::size_t i = 0; i < kSheetPictures; ++i) chosen.push_back(frames[i * (frames.size() - 1) / (kSheetPictures - 1)]);
-  return chosen;
-}
-
 std::vector<PlannedTask> Sheets(const JobSpec& job, const std::vector<PlannedFrame>& frames) {
   std::vector<PlannedInput> points;
   std::vector<PlannedInput> cells;
-  for (const PlannedFrame& frame : SheetFrames(frames)) {
+  for (const PlannedFrame& frame : Spread(frames, kSheetPictures)) {
     points.push_back(Blob(frame));
     cells.push_back(CellsOf(frame));
   }
@@ -141,6 +177,24 @@ absl::StatusOr<std::vector<PlannedFrame>> Ordered(std::vector<PlannedFrame> fram
   return frames;
 }
 
+/// Cells of all frames, the template where it is still to be chosen from them, and each stretch as soon as its frames are there. In a long take what
+/// the template is chosen from comes first: nothing after the stretches can start without it.
+void AddCells(const JobSpec& job, const std::vector<PlannedFrame>& frames, const PlannedStretches& stretches, std::vector<PlannedTask>& planned) {
+  std::set<std::int32_t> added;
+  const auto add = [&](const PlannedFrame& frame) {
+    if (added.insert(frame.number).second) planned.push_back(Tessellate(job, frame));
+  };
+  if (job.template_frame < 0) {
+    for (const PlannedFrame& frame : Spread(frames, kTemplateCandidates)) add(frame);
+    planned.push_back(Template(job, frames));
+  }
+  for (std::size_t s = 0; s < stretches.tasks.size(); ++s) {
+    for (std::int32_t i = stretches.ranges[s].first; i < stretches.ranges[s].last; ++i) add(frames[i]);
+    planned.push_back(stretches.tasks[s]);
+  }
+  for (const PlannedFrame& frame : frames) add(frame);
+}
+
 bool HasFrame(const std::vector<PlannedFrame>& frames, std::int32_t number) {
   return std::any_of(frames.begin(), frames.end(), [number](const PlannedFrame& frame) { return frame.number == number; });
 }
@@ -156,6 +210,7 @@ absl::StatusOr<std::vector<PlannedTask>> Plan(const JobSpec& job, const std::vec
   if (job.window_frames < 1 || job.overlap_frames < 0 || job.overlap_frames >= job.window_frames) {
     return absl::InvalidArgumentError(fmt::format("windows of {} frames cannot share {} with the next", job.window_frames, job.overlap_frames));
   }
+  if (job.stretch_frames < 1) return absl::InvalidArgumentError(fmt::format("stretches of {} frames cannot be followed", job.stretch_frames));
   if (closed && frames.empty()) return absl::FailedPreconditionError("the take was closed without a frame");
   const bool template_known = job.template_frame >= 0 && HasFrame(frames, job.template_frame);
   if (closed && job.template_frame >= 0 && !template_known) {
@@ -164,14 +219,17 @@ absl::StatusOr<std::vector<PlannedTask>> Plan(const JobSpec& job, const std::vec
 
   std::vector<PlannedTask> planned;
   if (template_known) planned.push_back(Template(job, frames));
-  for (const PlannedFrame& frame : frames) planned.push_back(Tessellate(job, frame));
-  if (!closed) return planned;
+  if (!closed) {
+    for (const PlannedFrame& frame : frames) planned.push_back(Tessellate(job, frame));
+    return planned;
+  }
 
-  if (!template_known) planned.push_back(Template(job, frames));
-  planned.push_back(Guide(frames));
+  const PlannedStretches stretches = Stretches(job, frames);
+  AddCells(job, frames, stretches, planned);
+  planned.push_back(Guide(frames, stretches));
   std::vector<PlannedTask> windows;
   for (const WindowRange& window : SplitWindows(static_cast<std::int32_t>(frames.size()), job.window_frames, job.overlap_frames)) {
-    windows.push_back(Track(job, frames, window));
+    windows.push_back(Track(job, frames, stretches, window));
   }
   PlannedTask assemble = Assemble(job, frames, windows);
   std::move(windows.begin(), windows.end(), std::back_inserter(planned));

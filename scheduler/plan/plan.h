@@ -27,6 +27,7 @@ struct JobSpec {
   std::int32_t patches = 200;
   std::int32_t window_frames = 10;
   std::int32_t overlap_frames = 3;    // frames that a window shares with the next
+  std::int32_t stretch_frames = 48;   // about; a take is followed coarsely in stretches of so many frames, side by side
   std::int32_t interpolated_max = 0;  // bad frames that are made up for; negative: a tenth of the take's frames
   double frames_per_second = 25;
   tasks::TrackOptions track;
@@ -53,8 +54,8 @@ struct PlannedTask {
 };
 
 /// The tasks that can be named from the frames known so far. `closed`: no frame will follow, so everything can be named.
-/// Calling it again with more frames returns a superset: the same names with the same content, in the same order. So the tasks of frames that
-/// have just arrived can be had by naming only those. The order is that in which a worker should take them.
+/// Calling it again with more frames returns a superset: the same names with the same content. So the tasks of frames that have just arrived can be
+/// had by naming only those. The order is that in which a worker should take them; when a take is closed, what others wait for comes first.
 /// FAILED_PRECONDITION for a closed take without frames or without the template frame that the job names.
 absl::StatusOr<std::vector<PlannedTask>> Plan(const JobSpec& job, const std::vector<PlannedFrame>& frames, bool closed);
 
@@ -65,12 +66,15 @@ std::int32_t InterpolatedMax(const JobSpec& job, std::int32_t frame_count);
 nlohmann::json ToJson(const JobSpec& job);
 absl::StatusOr<JobSpec> JobSpecFromJson(const nlohmann::json& json);
 
-/// Positions [first, last) of one tracking window in the take.
+/// Positions [first, last) in the take of one tracking window or stretch.
 struct WindowRange {
   std::int32_t first = 0;
   std::int32_t last = 0;
 };
 /// Consecutive windows share `overlap_frames`; a last window with less than half of the usual new frames is merged into the one before.
 std::vector<WindowRange> SplitWindows(std::int32_t frame_count, std::int32_t window_frames, std::int32_t overlap_frames);
+/// Stretches of equal length but for one frame, nearest to `stretch_frames`, each grown by a few frames that it shares with its neighbours. A take
+/// of less than one and a half stretches is one.
+std::vector<WindowRange> SplitStretches(std::int32_t frame_count, std::int32_t stretch_frames);
 
 }  // namespace vorocast::plan

@@ -5,6 +5,13 @@
 #include "services/base/check.h"
 
 namespace vorocast::plan {
+namespace {
+
+/// Neighbouring stretches share five frames, so that a bad one between them does no harm.
+constexpr std::int32_t kSharedBefore = 2;
+constexpr std::int32_t kSharedAfter = 3;
+
+}  // namespace
 
 std::vector<WindowRange> SplitWindows(std::int32_t frame_count, std::int32_t window_frames, std::int32_t overlap_frames) {
   VOROCAST_CHECK(window_frames > 0 && overlap_frames >= 0 && overlap_frames < window_frames);
@@ -21,6 +28,18 @@ std::vector<WindowRange> SplitWindows(std::int32_t frame_count, std::int32_t win
     windows.back().last = frame_count;
   }
   return windows;
+}
+
+std::vector<WindowRange> SplitStretches(std::int32_t frame_count, std::int32_t stretch_frames) {
+  VOROCAST_CHECK(stretch_frames > 0);
+  const std::int32_t count = std::max(1, (frame_count + stretch_frames / 2) / stretch_frames);
+  std::vector<WindowRange> stretches;
+  for (std::int64_t s = 0; s < count; ++s) {
+    const auto first = static_cast<std::int32_t>(s * frame_count / count);
+    const auto last = static_cast<std::int32_t>((s + 1) * frame_count / count);
+    stretches.push_back({std::max(0, first - kSharedBefore), std::min(frame_count, last + kSharedAfter)});
+  }
+  return stretches;
 }
 
 }  // namespace vorocast::plan

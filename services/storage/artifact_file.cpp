@@ -67,6 +67,7 @@ absl::Status CheckArtifact(const std::filesystem::path& path) {
   if (content == kCellsContent) return ReadCells(path).status();
   if (content == kTemplateContent) return ReadTemplate(path).status();
   if (content == kPosesContent) return ReadPoseTrack(path).status();
+  if (content == kStretchContent) return ReadStretch(path).status();
   if (content == kTrackedContent) return ReadTrackedTake(path).status();
   if (content == kSimulatedContent) return ReadSimulatedTake(path).status();
   return absl::DataLossError(fmt::format("{}: /@content: the file holds \"{}\", which is unknown", path.string(), content));

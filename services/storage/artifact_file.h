@@ -19,6 +19,7 @@ inline constexpr std::int32_t kFormatVersion = 1;
 inline constexpr std::string_view kCellsContent = "cells";
 inline constexpr std::string_view kTemplateContent = "template";
 inline constexpr std::string_view kPosesContent = "poses";
+inline constexpr std::string_view kStretchContent = "stretch";
 inline constexpr std::string_view kTrackedContent = "tracked";
 inline constexpr std::string_view kSimulatedContent = "simulated";
 

@@ -7,6 +7,7 @@
 
 #include "services/base/status.h"
 #include "services/geometry/simulated_take.h"
+#include "services/geometry/stretch.h"
 #include "services/geometry/tracked_take.h"
 
 /// The HDF5 files of docs/storage_format.md. Writers write the same bytes for the same content. Readers believe nothing: every shape,
@@ -50,6 +51,10 @@ absl::StatusOr<geometry::Template> ReadTemplate(const std::filesystem::path& pat
 /// guide.h5 and window.h5: /frames, /frame_state, /frame_residual, /frame_confidence, /patches/rotation, /patches/translation.
 absl::Status WritePoseTrack(const std::filesystem::path& path, const geometry::PoseTrack& track, const Provenance& provenance);
 absl::StatusOr<geometry::PoseTrack> ReadPoseTrack(const std::filesystem::path& path);
+
+/// stretch.h5: the layout of poses, /stretch/centroid, /stretch/patch, root attribute frame.
+absl::Status WriteStretch(const std::filesystem::path& path, const geometry::Stretch& stretch, const Provenance& provenance);
+absl::StatusOr<geometry::Stretch> ReadStretch(const std::filesystem::path& path);
 
 absl::Status WriteTrackedTake(const std::filesystem::path& path, const geometry::TrackedTake& take, const Provenance& provenance);
 absl::StatusOr<geometry::TrackedTake> ReadTrackedTake(const std::filesystem::path& path);

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
-// guide.h5, window.h5 and tracked.h5.
+// stretch.h5, guide.h5, window.h5 and tracked.h5.
+#include <algorithm>
+
 #include "services/storage/artifact_file.h"
 #include "services/storage/cells_layout.h"
 #include "services/storage/faults.h"
@@ -9,6 +11,7 @@ namespace vorocast::storage {
 
 using geometry::FrameState;
 using geometry::PoseTrack;
+using geometry::Stretch;
 using geometry::TrackedTake;
 using geometry::Vec3;
 
@@ -24,6 +27,15 @@ void WritePoseTrackLayout(Hdf5Writer& writer, const PoseTrack& track) {
   writer.Dataset<double>("/frame_confidence", {frames}, track.confidence.data());
   writer.Group("/patches");
   WritePoses(writer, "/patches", {frames, static_cast<hsize_t>(track.patch_count)}, track.world_from_template);
+}
+
+std::string FaultIn(const Stretch& stretch) {
+  const auto finite = [](const Vec3& x) { return x.allFinite(); };
+  if (stretch.centroid.empty() || stretch.patch.size() != stretch.centroid.size()) return "/stretch: its cells do not each have a patch";
+  if (!std::ranges::all_of(stretch.centroid, finite)) return "/stretch/centroid: a value is not finite";
+  const auto outside = [&](std::int32_t patch) { return patch < 0 || patch >= stretch.motion.patch_count; };
+  if (std::ranges::any_of(stretch.patch, outside)) return "/stretch/patch: a cell's patch has no poses";
+  return storage::FaultIn(stretch.motion);
 }
 
 absl::StatusOr<PoseTrack> ReadPoseTrackLayout(const Hdf5Reader& reader) {
@@ -56,6 +68,30 @@ absl::StatusOr<PoseTrack> ReadPoseTrack(const std::filesystem::path& path) {
   ASSIGN_OR_RETURN(PoseTrack track, ReadPoseTrackLayout(reader));
   if (const std::string fault = FaultIn(track); !fault.empty()) return reader.Wrong("values", fault);
   return track;
+}
+
+absl::Status WriteStretch(const std::filesystem::path& path, const Stretch& stretch, const Provenance& provenance) {
+  RETURN_IF_ERROR(RefuseToWrite(path, FaultIn(stretch)));
+  const hsize_t cells = stretch.centroid.size();
+  Hdf5Writer writer(path);
+  WriteRoot(writer, kStretchContent, provenance);
+  writer.Attribute("/", "frame", stretch.frame);
+  writer.Group("/stretch");
+  writer.Dataset<double>("/stretch/centroid", {cells, 3}, reinterpret_cast<const double*>(stretch.centroid.data()));
+  writer.Dataset<std::int32_t>("/stretch/patch", {cells}, stretch.patch.data());
+  WritePoseTrackLayout(writer, stretch.motion);
+  return writer.Finish();
+}
+
+absl::StatusOr<Stretch> ReadStretch(const std::filesystem::path& path) {
+  ASSIGN_OR_RETURN(const Hdf5Reader reader, OpenArtifact(path, kStretchContent));
+  Stretch stretch;
+  ASSIGN_OR_RETURN(stretch.frame, reader.Attribute<std::int32_t>("/", "frame"));
+  ASSIGN_OR_RETURN(stretch.centroid, (reader.Rows<double, double, 3, Vec3>("/stretch/centroid", {kAny})));
+  ASSIGN_OR_RETURN(stretch.patch, reader.Dataset<std::int32_t>("/stretch/patch", {static_cast<std::int64_t>(stretch.centroid.size())}));
+  ASSIGN_OR_RETURN(stretch.motion, ReadPoseTrackLayout(reader));
+  if (const std::string fault = FaultIn(stretch); !fault.empty()) return reader.Wrong("values", fault);
+  return stretch;
 }
 
 absl::Status WriteTrackedTake(const std::filesystem::path& path, const TrackedTake& take, const Provenance& provenance) {

@@ -39,6 +39,13 @@ static void Describe(Table& table, TemplateOptions& options) {
 }
 
 template <typename Table>
+static void Describe(Table& table, StretchOptions& options) {
+  table.Integer("points", options.points, 100, 1'000'000);
+  table.Integer("iterations", options.iterations, 1, 1000);
+  table.Integer("patches", options.patches, 1, kCellsMax);
+}
+
+template <typename Table>
 static void Describe(Table& table, GuideOptions& options) {
   table.Integer("points", options.points, 100, 1'000'000);
   table.Integer("iterations", options.iterations, 1, 1000);
@@ -99,6 +106,7 @@ absl::Status Read(const nlohmann::json& json, Options& target) {
 
 nlohmann::json ToJson(const TessellateOptions& options) { return Write(options); }
 nlohmann::json ToJson(const TemplateOptions& options) { return Write(options); }
+nlohmann::json ToJson(const StretchOptions& options) { return Write(options); }
 nlohmann::json ToJson(const GuideOptions& options) { return Write(options); }
 nlohmann::json ToJson(const TrackOptions& options) { return Write(options); }
 nlohmann::json ToJson(const AssembleOptions& options) { return Write(options); }
@@ -118,6 +126,7 @@ absl::Status FromJson(const nlohmann::json& json, TemplateOptions& target) {
   return absl::OkStatus();
 }
 
+absl::Status FromJson(const nlohmann::json& json, StretchOptions& options) { return Read(json, options); }
 absl::Status FromJson(const nlohmann::json& json, GuideOptions& options) { return Read(json, options); }
 
 absl::Status FromJson(const nlohmann::json& json, TrackOptions& target) {

@@ -38,6 +38,13 @@ struct TemplateOptions {
   std::int32_t patches = 200;  // 1 … cells
 };
 
+/// A stretch is followed as the guide follows a take, by patches of one of its own frames.
+struct StretchOptions {
+  std::int32_t points = 6000;  // surface points used a frame
+  std::int32_t iterations = 10;
+  std::int32_t patches = 200;  // of that frame's cells
+};
+
 struct GuideOptions {
   std::int32_t points = 6000;  // surface points used a frame
   std::int32_t iterations = 10;
@@ -72,6 +79,7 @@ struct SheetOptions {
 
 nlohmann::json ToJson(const TessellateOptions&);
 nlohmann::json ToJson(const TemplateOptions&);
+nlohmann::json ToJson(const StretchOptions&);
 nlohmann::json ToJson(const GuideOptions&);
 nlohmann::json ToJson(const TrackOptions&);
 nlohmann::json ToJson(const AssembleOptions&);
@@ -80,6 +88,7 @@ nlohmann::json ToJson(const SheetOptions&);
 
 absl::Status FromJson(const nlohmann::json&, TessellateOptions&);
 absl::Status FromJson(const nlohmann::json&, TemplateOptions&);
+absl::Status FromJson(const nlohmann::json&, StretchOptions&);
 absl::Status FromJson(const nlohmann::json&, GuideOptions&);
 absl::Status FromJson(const nlohmann::json&, TrackOptions&);
 absl::Status FromJson(const nlohmann::json&, AssembleOptions&);

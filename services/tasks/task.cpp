@@ -15,7 +15,7 @@ namespace {
 
 /// The template task of the longest take reads each frame's points and cells.
 constexpr std::size_t kInputsMax = 2 * kFramesMax;
-constexpr std::array<std::string_view, 7> kRoles = {"frame", "template", "guide", "cells", "window", "tracked", "simulated"};
+constexpr std::array<std::string_view, 9> kRoles = {"frame", "template", "stretch", "guide", "cells", "window", "tracked", "target", "simulated"};
 
 struct KindTraits {
   Kind kind;
@@ -24,8 +24,8 @@ struct KindTraits {
   std::string_view extension;
 };
 constexpr KindTraits kTraits[] = {
-    {Kind::kTessellate, "tessellate", 1, ".h5"}, {Kind::kTemplate, "template", 1, ".h5"}, {Kind::kGuide, "guide", 1, ".h5"},
-    {Kind::kTrack, "track", 1, ".h5"},           {Kind::kAssemble, "assemble", 1, ".h5"}, {Kind::kSimulate, "simulate", 1, ".h5"},
+    {Kind::kTessellate, "tessellate", 1, ".h5"}, {Kind::kTemplate, "template", 1, ".h5"}, {Kind::kStretch, "stretch", 1, ".h5"}, {Kind::kGuide, "guide", 2, ".h5"},
+    {Kind::kTrack, "track", 1, ".h5"},           {Kind::kAssemble, "assemble", 1, ".h5"}, {Kind::kSimulate, "simulate", 2, ".h5"},
     {Kind::kSheet, "sheet", 1, ".png"},
 };
 
@@ -50,6 +50,8 @@ absl::Status CheckOptions(Kind kind, const nlohmann::json& json) {
       return CheckOptions<TessellateOptions>(json);
     case Kind::kTemplate:
       return CheckOptions<TemplateOptions>(json);
+    case Kind::kStretch:
+      return CheckOptions<StretchOptions>(json);
     case Kind::kGuide:
       return CheckOptions<GuideOptions>(json);
     case Kind::kTrack:

@@ -17,13 +17,16 @@ namespace vorocast::tasks {
 enum class Kind : std::uint8_t {
   kTessellate,  // one frame's points -> cells.h5
   kTemplate,    // one frame's points -> template.h5 (more iterations, patches)
-  kGuide,       // template + every frame's cells -> guide.h5: a coarse pose of every patch in every frame
-  kTrack,       // template + guide + the cells of one window's frames -> window.h5
+  kStretch,     // the cells of a stretch's frames -> stretch.h5: how they move coarsely, whatever the template
+  kGuide,       // template + every frame's cells -> guide.h5: a coarse pose of every patch in every frame. In a long take: template + all stretches
+                // + the cells of the frames that those share -> guide.h5: coarse poses in the seams between stretches
+  kTrack,       // template + guide (+ the window's stretches) + the cells of one window's frames -> window.h5
   kAssemble,    // template + all windows -> tracked.h5
   kSimulate,    // tracked.h5 + effect -> simulated.h5
   kSheet,       // pictures of one stage -> PNG
 };
-inline constexpr Kind kAllKinds[] = {Kind::kTessellate, Kind::kTemplate, Kind::kGuide, Kind::kTrack, Kind::kAssemble, Kind::kSimulate, Kind::kSheet};
+inline constexpr Kind kAllKinds[] = {Kind::kTessellate, Kind::kTemplate, Kind::kStretch,  Kind::kGuide,
+                                     Kind::kTrack,      Kind::kAssemble, Kind::kSimulate, Kind::kSheet};
 
 std::string_view Name(Kind kind);                          // "tessellate", …
 absl::StatusOr<Kind> KindFromName(std::string_view name);  // INVALID_ARGUMENT lists the names
@@ -35,7 +38,7 @@ std::string_view Extension(Kind kind);
 /// One thing a task reads. A captured frame is a blob named by its bytes; a result is an artifact named by what made it.
 struct Input {
   enum class Source : std::uint8_t { kBlob, kArtifact };
-  std::string role;         // "frame", "template", "guide", "cells", "window", "tracked", "simulated"
+  std::string role;         // "frame", "template", "stretch", "guide", "cells", "window", "tracked", "simulated"
   std::int32_t frame = -1;  // captured frame number it stands for, or −1
   Source source = Source::kArtifact;
   std::string extension;  // of the stored file, with its dot: ".ply", ".h5"

@@ -4,6 +4,7 @@
 #include "workers/agent/assemble_executor.h"
 #include "workers/agent/guide_executor.h"
 #include "workers/agent/sheet_executor.h"
+#include "workers/agent/stretch_executor.h"
 #include "workers/agent/template_executor.h"
 #include "workers/agent/tessellate_executor.h"
 #include "workers/agent/track_executor.h"
@@ -14,6 +15,7 @@ std::vector<std::unique_ptr<lease::Executor>> AllExecutors() {
   std::vector<std::unique_ptr<lease::Executor>> executors;
   executors.push_back(std::make_unique<TessellateExecutor>());
   executors.push_back(std::make_unique<TemplateExecutor>());
+  executors.push_back(std::make_unique<StretchExecutor>());
   executors.push_back(std::make_unique<GuideExecutor>());
   executors.push_back(std::make_unique<TrackExecutor>());
   executors.push_back(std::make_unique<AssembleExecutor>());

@@ -2,7 +2,7 @@
 #include "workers/agent/guide_executor.h"
 
 #include <algorithm>
-#include <utility>
+#include <iterator>
 
 #include "services/tasks/options.h"
 #include "workers/agent/task_inputs.h"
@@ -10,12 +10,30 @@
 namespace vorocast::agent {
 namespace {
 
-/// All frames are in memory at once: together they may hold this many points, half a gigabyte, however long the take.
-constexpr std::size_t kSurfacePointsMax = 12'000'000;
-constexpr std::size_t kInnerPointsMax = 4'000'000;
-constexpr std::size_t kInnerPointsEnough = 1000;
 /// Share of the time for reading, for the progress.
 constexpr double kRead = 0.3;
+
+/// The seams' frames among the inputs.
+std::vector<const tasks::Input*> InputsOfFrames(const std::vector<const tasks::Input*>& inputs, const std::vector<std::int32_t>& frames) {
+  std::vector<const tasks::Input*> chosen;
+  std::ranges::copy_if(inputs, std::back_inserter(chosen),
+                       [&](const tasks::Input* input) { return std::ranges::binary_search(frames, input->frame); });
+  return chosen;
+}
+
+/// A take in stretches is joined at their seams; a short one is followed as a whole.
+absl::StatusOr<geometry::PoseTrack> GuideOf(const tasks::TaskSpec& spec, const storage::ArtifactStore& store, const geometry::Template& model,
+                                            const tracking::GuideOptions& options, const base::Progress& progress) {
+  ASSIGN_OR_RETURN(const std::vector<geometry::Stretch> stretches, ReadStretches(spec, store));
+  std::vector<const tasks::Input*> inputs = InputsOf(spec, "cells");
+  if (!stretches.empty()) {
+    ASSIGN_OR_RETURN(const std::vector<std::int32_t> seams, tracking::SeamFrames(stretches));
+    inputs = InputsOfFrames(inputs, seams);
+  }
+  ASSIGN_OR_RETURN(const std::vector<tracking::Observation> frames, CoarseObservationsOf(inputs, store, options.points, Part(progress, 0, kRead)));
+  if (stretches.empty()) return tracking::Guide(model, frames, options, Part(progress, kRead, 1));
+  return tracking::JoinStretches(model, stretches, frames, options, Part(progress, kRead, 1));
+}
 
 }  // namespace
 
@@ -24,18 +42,7 @@ absl::Status GuideExecutor::Execute(const tasks::TaskSpec& spec, const storage::
   ASSIGN_OR_RETURN(const auto options, OptionsOf<tasks::GuideOptions>(spec));
   ASSIGN_OR_RETURN(const std::filesystem::path template_path, PathOfOnly(spec, "template", store));
   ASSIGN_OR_RETURN(const geometry::Template model, storage::ReadTemplate(template_path));
-
-  const std::vector<const tasks::Input*> inputs = InputsOf(spec, "cells");
-  const std::size_t count = std::max<std::size_t>(inputs.size(), 1);
-  const std::size_t surface_max = std::max(static_cast<std::size_t>(options.points), kSurfacePointsMax / count);
-  const std::size_t inner_max = std::max(kInnerPointsEnough, kInnerPointsMax / count);
-  std::vector<tracking::Observation> frames;
-  for (const tasks::Input* input : inputs) {
-    ASSIGN_OR_RETURN(tracking::Observation observation, ObservationOf(*input, store, surface_max, inner_max));
-    frames.push_back(std::move(observation));
-    base::Report(progress, kRead * static_cast<double>(frames.size()) / static_cast<double>(count));
-  }
-  ASSIGN_OR_RETURN(const geometry::PoseTrack track, tracking::Guide(model, frames, {options.points, options.iterations}, Part(progress, kRead, 1)));
+  ASSIGN_OR_RETURN(const geometry::PoseTrack track, GuideOf(spec, store, model, {options.points, options.iterations}, progress));
   return storage::WritePoseTrack(output, track, ProvenanceOf(spec, 0));
 }
 

@@ -5,7 +5,7 @@
 
 namespace vorocast::agent {
 
-/// Template and every frame's cells -> guide.h5.
+/// Template and every frame's cells, or all stretches and the cells of the frames they share -> guide.h5.
 class GuideExecutor : public lease::Executor {
  public:
   tasks::Kind kind() const override { return tasks::Kind::kGuide; }

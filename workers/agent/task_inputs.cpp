@@ -1,12 +1,20 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "workers/agent/task_inputs.h"
 
+#include <algorithm>
 #include <utility>
 
 #include <fmt/format.h>
 
 namespace vorocast::agent {
 namespace {
+
+/// All frames of a coarse pass are in memory at once: together they may hold this many points, half a gigabyte.
+constexpr std::size_t kSurfacePointsMax = 12'000'000;
+constexpr std::size_t kInnerPointsMax = 4'000'000;
+constexpr std::size_t kInnerPointsEnough = 1000;
+/// Every iteration draws other points; so many times those of one are as good as all.
+constexpr std::size_t kDraws = 4;
 
 /// Every entry of an even choice of at most `most`.
 template <typename T>
@@ -63,6 +71,32 @@ absl::StatusOr<tracking::Observation> ObservationOf(const tasks::Input& input, c
   observation.inner = Thinned(std::move(observed->centroid), inner_max);
   observation.inner_depth = Thinned(std::move(observed->depth), inner_max);
   return observation;
+}
+
+absl::StatusOr<std::vector<tracking::Observation>> CoarseObservationsOf(const std::vector<const tasks::Input*>& inputs,
+                                                                        const storage::ArtifactStore& store, std::int32_t points,
+                                                                        const base::Progress& progress) {
+  const std::size_t count = std::max<std::size_t>(inputs.size(), 1);
+  const auto drawn = static_cast<std::size_t>(points);
+  const std::size_t surface_max = std::max(drawn, std::min(kDraws * drawn, kSurfacePointsMax / count));
+  const std::size_t inner_max = std::max(kInnerPointsEnough, kInnerPointsMax / count);
+  std::vector<tracking::Observation> frames;
+  for (const tasks::Input* input : inputs) {
+    ASSIGN_OR_RETURN(tracking::Observation observation, ObservationOf(*input, store, surface_max, inner_max));
+    frames.push_back(std::move(observation));
+    base::Report(progress, static_cast<double>(frames.size()) / static_cast<double>(count));
+  }
+  return frames;
+}
+
+absl::StatusOr<std::vector<geometry::Stretch>> ReadStretches(const tasks::TaskSpec& spec, const storage::ArtifactStore& store) {
+  std::vector<geometry::Stretch> stretches;
+  for (const tasks::Input* input : InputsOf(spec, "stretch")) {
+    if (!input->digest) return absl::InvalidArgumentError(fmt::format("stretch {} is missing", stretches.size()));
+    ASSIGN_OR_RETURN(geometry::Stretch stretch, storage::ReadStretch(PathOf(*input, store)));
+    stretches.push_back(std::move(stretch));
+  }
+  return stretches;
 }
 
 base::Progress Part(const base::Progress& whole, double begin, double end) {

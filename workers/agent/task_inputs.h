@@ -37,6 +37,15 @@ storage::Provenance ProvenanceOf(const tasks::TaskSpec& spec, std::uint64_t seed
 absl::StatusOr<tracking::Observation> ObservationOf(const tasks::Input& input, const storage::ArtifactStore& store, std::size_t surface_max,
                                                     std::size_t inner_max);
 
+/// The same of many frames for a coarse pass, which draws `points` surface points a frame at a time: a few times as many, and bounded however long
+/// the take.
+absl::StatusOr<std::vector<tracking::Observation>> CoarseObservationsOf(const std::vector<const tasks::Input*>& inputs,
+                                                                        const storage::ArtifactStore& store, std::int32_t points,
+                                                                        const base::Progress& progress);
+
+/// The task's inputs of the role "stretch". INVALID_ARGUMENT for one that is missing.
+absl::StatusOr<std::vector<geometry::Stretch>> ReadStretches(const tasks::TaskSpec& spec, const storage::ArtifactStore& store);
+
 /// A part of a longer task's progress: 0 … 1 becomes begin … end.
 base::Progress Part(const base::Progress& whole, double begin, double end);
 

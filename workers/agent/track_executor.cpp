@@ -36,7 +36,11 @@ absl::Status TrackExecutor::Execute(const tasks::TaskSpec& spec, const storage::
   ASSIGN_OR_RETURN(const std::filesystem::path template_path, PathOfOnly(spec, "template", store));
   ASSIGN_OR_RETURN(const geometry::Template model, storage::ReadTemplate(template_path));
   ASSIGN_OR_RETURN(const std::filesystem::path guide_path, PathOfOnly(spec, "guide", store));
-  ASSIGN_OR_RETURN(const geometry::PoseTrack start, storage::ReadPoseTrack(guide_path));
+  ASSIGN_OR_RETURN(geometry::PoseTrack start, storage::ReadPoseTrack(guide_path));
+  ASSIGN_OR_RETURN(const std::vector<geometry::Stretch> stretches, ReadStretches(spec, store));
+  if (!stretches.empty()) {
+    ASSIGN_OR_RETURN(start, tracking::CarryAlongStretches(model, start, stretches, options.frames));
+  }
   ASSIGN_OR_RETURN(const std::vector<tracking::Observation> window, ReadWindow(spec, store, options.frames));
 
   const tracking::TrackOptions track_options{.iterations = options.iterations,

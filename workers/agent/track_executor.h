@@ -5,7 +5,7 @@
 
 namespace vorocast::agent {
 
-/// Template, guide and the cells of one window's frames -> window.h5.
+/// Template, guide, in a long take the stretches that the window lies in, and the cells of one window's frames -> window.h5.
 class TrackExecutor : public lease::Executor {
  public:
   tasks::Kind kind() const override { return tasks::Kind::kTrack; }

@@ -1,100 +1,14 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
-#include <fmt/format.h>
-
 #include <algorithm>
-#include <cmath>
 
-#include "workers/tracking/frame_fit.h"
+#include "workers/tracking/follower.h"
 #include "workers/tracking/pose_interpolation.h"
-#include "workers/tracking/tracking.h"
 
 namespace vorocast::tracking {
 namespace {
 
 using geometry::FrameState;
 using geometry::PoseTrack;
-
-constexpr double kSigmaStartM = 0.030;
-constexpr double kSigmaEndM = 0.012;
-constexpr double kRegulariser = 0.3;
-constexpr double kFromLastFrame = 0.8;
-constexpr std::size_t kPointsCompared = 1500;
-
-FitStage StageOf(const GuideOptions& options, std::int32_t iteration, std::size_t points) {
-  const double progress = options.iterations > 1 ? static_cast<double>(iteration) / (options.iterations - 1) : 1.0;
-  FitStage stage;
-  stage.coarse = true;
-  stage.sigma_m = kSigmaStartM * std::pow(kSigmaEndM / kSigmaStartM, progress);
-  stage.reach_m = 2 * stage.sigma_m;
-  stage.cosine_min = 0.5;
-  stage.regulariser = kRegulariser;
-  stage.stride =
-      std::max<std::size_t>(1, points / static_cast<std::size_t>(2 * iteration < options.iterations ? options.points / 3 : options.points));
-  stage.phase = static_cast<std::size_t>(iteration) % stage.stride;
-  return stage;
-}
-
-/// Follows the template from frame to frame in one direction.
-class Follower {
- public:
-  Follower(const PatchModel& model, FrameFit& fit, const GuideOptions& options, std::int32_t frame, Pose pose)
-      : model_(model), fit_(fit), options_(options), now_frame_(frame), now_(std::move(pose)) {}
-
-  const Pose& Follow(std::int32_t frame, const ObservedFrame& observed) {
-    Pose pose = Start(frame, observed);
-    const std::vector<Relation> reference = Reference();
-    for (std::int32_t i = 0; i < options_.iterations; ++i) fit_.Step(observed, StageOf(options_, i, observed.position.size()), reference, pose);
-    before_frame_ = now_frame_;
-    before_ = std::move(now_);
-    now_frame_ = frame;
-    now_ = std::move(pose);
-    return now_;
-  }
-
- private:
-  /// The last pose, or the one that goes on as the last two went: whichever explains the points better.
-  Pose Start(std::int32_t frame, const ObservedFrame& observed) {
-    if (before_.empty()) return now_;
-    const double steps = static_cast<double>(frame - now_frame_) / (now_frame_ - before_frame_);
-    Pose moved;
-    for (std::int32_t k = 0; k < model_.patch_count; ++k) moved.push_back(Extrapolate(model_.centre[k], before_[k], now_[k], steps));
-    FitStage stage = StageOf(options_, 0, observed.position.size());
-    stage.stride = std::max<std::size_t>(1, observed.position.size() / kPointsCompared);
-    stage.phase = 0;
-    const double still = fit_.Measure(observed, stage, now_).squared_mean;
-    return fit_.Measure(observed, stage, moved).squared_mean < still ? moved : now_;
-  }
-
-  /// Neighbouring patches should lie nearly as in the last frame, drawn a little towards the template, lest errors add up.
-  std::vector<Relation> Reference() const {
-    std::vector<Relation> reference = RelationsOf(model_, now_);
-    for (Relation& relation : reference) {
-      relation.matrix = kFromLastFrame * relation.matrix + (1 - kFromLastFrame) * geometry::Mat3::Identity();
-      relation.offset *= kFromLastFrame;
-    }
-    return reference;
-  }
-
-  const PatchModel& model_;
-  FrameFit& fit_;
-  const GuideOptions& options_;
-  std::int32_t now_frame_;
-  Pose now_;
-  std::int32_t before_frame_ = 0;
-  Pose before_;
-};
-
-absl::Status ValidateGuide(const std::vector<Observation>& frames, const GuideOptions& options) {
-  if (options.points < 100) return absl::InvalidArgumentError(fmt::format("{} points a frame; at least 100 are needed", options.points));
-  if (options.iterations < 1) return absl::InvalidArgumentError(fmt::format("{} iterations; at least 1 is needed", options.iterations));
-  if (frames.empty()) return absl::InvalidArgumentError("there are no frames");
-  for (std::size_t f = 1; f < frames.size(); ++f) {
-    if (frames[f].frame <= frames[f - 1].frame) {
-      return absl::InvalidArgumentError(fmt::format("frame {} follows frame {}; frames must ascend", frames[f].frame, frames[f - 1].frame));
-    }
-  }
-  return absl::OkStatus();
-}
 
 /// The pass through all frames, outward from the template's.
 class GuidePass {
@@ -112,15 +26,46 @@ class GuidePass {
   absl::StatusOr<PoseTrack> Run(std::int32_t template_frame) {
     const Pose identity(static_cast<std::size_t>(model_.patch_count));
     const auto first = std::ranges::lower_bound(track_.frames, template_frame) - track_.frames.begin();
+    const bool observed = first < std::ssize(frames_) && frames_[first].frame == template_frame;
     Follower forward(model_, fit_, options_, template_frame - 1, identity);
-    for (auto f = first; f < std::ssize(frames_); ++f) RETURN_IF_ERROR(Take(forward, f));
-    Follower backward(model_, fit_, options_, template_frame + 1, identity);
+    if (observed) RETURN_IF_ERROR(Take(forward, first));
+    Follower backward = observed ? forward : Follower(model_, fit_, options_, template_frame + 1, identity);
+    if (observed && first > 0 && first + 1 < std::ssize(frames_)) RETURN_IF_ERROR(FindSpeed(forward, backward, first));
+    for (auto f = first + (observed ? 1 : 0); f < std::ssize(frames_); ++f) RETURN_IF_ERROR(Take(forward, f));
     for (auto f = first - 1; f >= 0; --f) RETURN_IF_ERROR(Take(backward, f));
     RETURN_IF_ERROR(FillUntracked(model_.centre, track_));
     return std::move(track_);
   }
 
  private:
+  /// A template in the midst of its frames may be moving fast, and nothing tells how fast. Followed from rest, the frame before it and the frame
+  /// after it are each a guess at its speed, which the other direction may start with; the one that fits better goes first.
+  absl::Status FindSpeed(Follower& forward, Follower& backward, std::ptrdiff_t first) {
+    ASSIGN_OR_RETURN(const ObservedFrame before, PrepareObservation(frames_[first - 1]));
+    ASSIGN_OR_RETURN(const ObservedFrame after, PrepareObservation(frames_[first + 1]));
+    if (before.empty() || after.empty()) return absl::OkStatus();
+    const std::int32_t before_frame = frames_[first - 1].frame;
+    const std::int32_t after_frame = frames_[first + 1].frame;
+    Pose ahead = Follower(forward).Follow(after_frame, after);
+    Pose behind = Follower(backward).Follow(before_frame, before);
+    if (SquaredMean(before, behind) < SquaredMean(after, ahead)) {
+      forward.Expect(before_frame, std::move(behind));
+      ahead = Follower(forward).Follow(after_frame, after);
+      backward.Expect(after_frame, std::move(ahead));
+    } else {
+      backward.Expect(after_frame, std::move(ahead));
+      behind = Follower(backward).Follow(before_frame, before);
+      forward.Expect(before_frame, std::move(behind));
+    }
+    return absl::OkStatus();
+  }
+
+  double SquaredMean(const ObservedFrame& observed, const Pose& pose) {
+    FitStage stage = GuideStage(options_, options_.iterations - 1, observed.position.size());
+    stage.phase = 0;
+    return fit_.Measure(observed, stage, pose).squared_mean;
+  }
+
   absl::Status Take(Follower& follower, std::ptrdiff_t f) {
     auto observed = PrepareObservation(frames_[f]);
     if (!observed.ok()) return observed.status();
@@ -128,7 +73,7 @@ class GuidePass {
     if (observed->empty()) return absl::OkStatus();
     const Pose& pose = follower.Follow(frames_[f].frame, *observed);
     std::ranges::copy(pose, track_.world_from_template.begin() + f * model_.patch_count);
-    FitStage stage = StageOf(options_, options_.iterations - 1, observed->position.size());
+    FitStage stage = GuideStage(options_, options_.iterations - 1, observed->position.size());
     stage.phase = 0;
     const FitQuality quality = fit_.Measure(*observed, stage, pose);
     track_.residual[f] = quality.residual_m;

@@ -6,6 +6,7 @@
 
 #include "services/base/progress.h"
 #include "services/base/status.h"
+#include "services/geometry/stretch.h"
 #include "services/geometry/tracked_take.h"
 
 /// Volumetric tracking (paper, section 4; Allain et al. 2015): a template's patches follow incoherent observations through time.
@@ -34,6 +35,26 @@ struct GuideOptions {
 /// marked. INVALID_ARGUMENT when no frame can be followed.
 absl::StatusOr<geometry::PoseTrack> Guide(const geometry::Template& model, const std::vector<Observation>& frames, const GuideOptions& options,
                                           const base::Progress& progress);
+
+/// The same pass for a long take, in parts that run side by side (docs/decisions/0006-a-guide-in-stretches.md). First every stretch of the take is
+/// followed on its own, outward from one of its frames, `own`. `frames` ascend and hold own.frame.
+absl::StatusOr<geometry::Stretch> FollowStretch(const geometry::Template& own, const std::vector<Observation>& frames, const GuideOptions& options,
+                                                const base::Progress& progress);
+
+/// One frame for each pair of consecutive stretches, in which both know where they are: where one hands the template over to the next.
+/// INVALID_ARGUMENT when two of them share no frame.
+absl::StatusOr<std::vector<std::int32_t>> SeamFrames(const std::vector<geometry::Stretch>& stretches);
+
+/// Then the template is carried by the stretches' motions, outward from its own frame, and fitted to what was seen in each seam frame: its poses in
+/// those frames and its own. `seams` holds an observation, perhaps a missing one, of each of SeamFrames(). INVALID_ARGUMENT when no stretch holds the
+/// template's frame.
+absl::StatusOr<geometry::PoseTrack> JoinStretches(const geometry::Template& model, const std::vector<geometry::Stretch>& stretches,
+                                                  const std::vector<Observation>& seams, const GuideOptions& options, const base::Progress& progress);
+
+/// What Guide gives for `frames` (ascending), from the poses that JoinStretches left: in between, the stretches carry the template from both sides.
+/// `stretches` need only be those that hold a frame of `frames`.
+absl::StatusOr<geometry::PoseTrack> CarryAlongStretches(const geometry::Template& model, const geometry::PoseTrack& joined,
+                                                        const std::vector<geometry::Stretch>& stretches, const std::vector<std::int32_t>& frames);
 
 struct TrackOptions {
   std::int32_t iterations = 16;

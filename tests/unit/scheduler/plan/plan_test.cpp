@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <map>
 #include <set>
 
 #include <fmt/format.h>
@@ -93,18 +95,67 @@ TEST(Plan, PointsSheetShowsTwelveFramesFromFirstToLast) {
   }
 }
 
-TEST(Plan, MoreFramesGiveASupersetInTheSameOrder) {
+TEST(Plan, MoreFramesGiveASuperset) {
   for (const std::int32_t template_frame : {-1, 3}) {
     JobSpec job = Small();
     job.template_frame = template_frame;
     const std::vector<PlannedFrame> take = Take(9);
     const std::string whole = Draw(Planned(job, take, true));
     for (std::size_t known = 0; known <= take.size(); ++known) {
-      std::size_t at = 0;
       for (const PlannedTask& task : Planned(job, {take.begin(), take.begin() + static_cast<std::ptrdiff_t>(known)}, false)) {
-        at = whole.find(Draw({task}), at);
-        ASSERT_NE(at, std::string::npos) << task.name;
+        ASSERT_NE(whole.find(Draw({task})), std::string::npos) << task.name;
       }
+    }
+  }
+}
+
+TEST(Plan, ALongTakeIsGuidedInStretches) {
+  JobSpec job = Small();
+  job.stretch_frames = 8;
+  job.window_frames = 6;
+  job.overlap_frames = 2;
+  job.sheets = false;
+  std::map<std::string, PlannedTask> tasks;
+  for (PlannedTask& task : Planned(job, Take(17), true)) tasks.emplace(task.name, std::move(task));
+  const auto inputs = [&](const std::string& name, const std::string& role) {
+    std::vector<std::string> from;
+    for (const PlannedInput& input : tasks.at(name).inputs) {
+      if (input.role == role) from.push_back(input.task);
+    }
+    return from;
+  };
+  const auto frames = [](std::int32_t first, std::int32_t last) {
+    std::vector<std::string> names;
+    for (std::int32_t f = first; f <= last; ++f) names.push_back(fmt::format("frame {}: tessellate", f));
+    return names;
+  };
+  EXPECT_EQ(inputs("stretch 0-10: follow", "cells"), frames(0, 10));
+  EXPECT_EQ(inputs("stretch 6-16: follow", "cells"), frames(6, 16));
+  EXPECT_EQ(inputs("guide", "stretch"), (std::vector<std::string>{"stretch 0-10: follow", "stretch 6-16: follow"}));
+  EXPECT_EQ(inputs("guide", "cells"), frames(6, 10));
+  EXPECT_EQ(inputs("window 0-5: track", "stretch"), std::vector<std::string>{"stretch 0-10: follow"});
+  EXPECT_EQ(inputs("window 4-9: track", "stretch"), (std::vector<std::string>{"stretch 0-10: follow", "stretch 6-16: follow"}));
+}
+
+TEST(Plan, TheTemplateOfALongTakeIsChosenFromFewFramesThatComeFirst) {
+  const auto tasks = Planned(Small(), Take(500), true);
+  const auto chosen = std::ranges::find(tasks, std::string("template"), &PlannedTask::name);
+  ASSERT_NE(chosen, tasks.end());
+  EXPECT_EQ(chosen - tasks.begin(), 64);
+  EXPECT_EQ(chosen->inputs.size(), 2u * 64);
+  EXPECT_EQ(chosen->inputs.front().frame, 0);
+  EXPECT_EQ(chosen->inputs.back().frame, 499);
+}
+
+TEST(Plan, StretchesCoverTheTakeAndShareFrames) {
+  for (std::int32_t count = 1; count < 400; ++count) {
+    const auto stretches = SplitStretches(count, 48);
+    EXPECT_EQ(stretches.size() == 1, count < 72) << count;
+    EXPECT_EQ(stretches.front().first, 0);
+    EXPECT_EQ(stretches.back().last, count);
+    for (std::size_t s = 1; s < stretches.size(); ++s) {
+      EXPECT_EQ(stretches[s - 1].last - stretches[s].first, 5) << count;
+      EXPECT_GE(stretches[s].last - stretches[s].first, 36) << count;
     }
   }
 }

@@ -184,6 +184,34 @@ TEST_F(ExecutorsTest, ATakeGoesThroughTheWholeGraph) {
     EXPECT_EQ(take.patches.state[f] == geometry::FrameState::kInterpolated, static_cast<std::int32_t>(f) == kBadFrame);
   }
 
+  // The same take as a long one is planned: two stretches, whose seam is the bad frame's neighbour.
+  tasks::TaskSpec join_spec{Kind::kGuide, ToJson(tasks::GuideOptions{.points = 3000}), {model_input}};
+  std::vector<Input> stretches;
+  for (const auto& [begin, end] : {std::pair(0, 5), std::pair(2, 6)}) {
+    tasks::TaskSpec stretch_spec{Kind::kStretch, ToJson(tasks::StretchOptions{.points = 3000, .patches = 8}), {}};
+    stretch_spec.inputs.assign(cells.begin() + begin, cells.begin() + end);
+    stretches.push_back(Make(stretch_spec, "stretch"));
+    join_spec.inputs.push_back(stretches.back());
+  }
+  join_spec.inputs.insert(join_spec.inputs.end(), cells.begin() + 2, cells.begin() + 5);
+  const Input seams = Make(join_spec, "guide");
+  tasks::TaskSpec track_spec{Kind::kTrack, ToJson(tasks::TrackOptions{.iterations = 8, .frames = {1, 2, 4, 5}}), {model_input, seams}};
+  track_spec.inputs.insert(track_spec.inputs.end(), stretches.begin(), stretches.end());
+  for (const std::size_t frame : {1, 2, 4, 5}) track_spec.inputs.push_back(cells[frame]);
+  const geometry::PoseTrack window = storage::ReadPoseTrack(PathOf(Make(track_spec, "window"))).value();
+  for (std::size_t f = 0; f < window.frames.size(); ++f) {
+    const Rigid3 world_from_template = WorldFromEgg(window.frames[f]) * WorldFromEgg(model.frame).Inverse();
+    double error = 0;
+    for (std::size_t c = 0; c < take.cell_count(); ++c) {
+      error += (window.Pose(f, model.patch[c]) * model.cells.centroid[c] - world_from_template * model.cells.centroid[c]).norm();
+    }
+    EXPECT_LT(error / static_cast<double>(take.cell_count()), 0.006) << "frame " << window.frames[f];
+  }
+
+  // A stretch of bad frames stands still.
+  const Input still = Make({Kind::kStretch, ToJson(tasks::StretchOptions{}), {cells[kBadFrame]}}, "stretch");
+  EXPECT_EQ(storage::ReadStretch(PathOf(still)).value().motion.state, std::vector{geometry::FrameState::kInterpolated});
+
   // Pictures.
   const auto expect_png = [&](const std::string& stage, const std::vector<Input>& inputs) {
     const tasks::SheetOptions options{.stage = stage, .pictures = 2, .width = 48, .capture = tessellate_.capture};
