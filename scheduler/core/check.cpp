@@ -161,7 +161,9 @@ absl::Status CheckJob(const State& state, const Job& job) {
 }  // namespace
 
 absl::Status Check(const State& state, bool keys) {
-  for (TaskIndex index = 0; index < state.tasks.size(); ++index) RETURN_IF_ERROR(CheckTask(state, index, keys));
+  for (TaskIndex index = 0; index < state.tasks.size(); ++index) {
+    if (state.tasks.HasBlock(index) && state.tasks[index].job != kNone) RETURN_IF_ERROR(CheckTask(state, index, keys));
+  }
   RETURN_IF_ERROR(CheckRuns(state));
   RETURN_IF_ERROR(CheckWorkers(state));
   for (const Job& job : state.jobs) RETURN_IF_ERROR(CheckJob(state, job));

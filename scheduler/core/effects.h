@@ -15,6 +15,7 @@ namespace vorocast::core {
 struct LookUp {
   base::Digest key;
   std::string extension;
+  bool verify = false;  // an existing file's bytes too
 };
 
 struct Lease {

@@ -37,6 +37,7 @@ struct JobSubmitted {
   // After a restart: what became of it before.
   bool cancelled = false;
   std::vector<TaskFailed> failures;
+  bool verify = false;  // its existing results are read and held against their digests
 };
 /// Tasks of a submitted job, each after those it reads. Names that the job has already are passed over.
 struct TasksAdded {
@@ -88,11 +89,16 @@ struct Tick {};
 struct CancelJob {
   std::string job;
 };
+/// Tries failed and cancelled tasks again. A job that is over also looks for each of its results again, and reads it: files get lost and damaged.
 struct RetryJob {
+  std::string job;
+};
+/// Frees what a job that is over takes in memory. For others nothing happens.
+struct JobForgotten {
   std::string job;
 };
 
 using Event = std::variant<Restored, JobSubmitted, TasksAdded, LookUpAnswered, WorkerConnected, WorkerDisconnected, WorkerLeaving, Heartbeat,
-                           Finished, Tick, CancelJob, RetryJob>;
+                           Finished, Tick, CancelJob, RetryJob, JobForgotten>;
 
 }  // namespace vorocast::core

@@ -37,6 +37,7 @@ void Transition::On(JobSubmitted& event) {
   job.user = std::move(event.user);
   job.priority = event.priority;
   job.cancelled = event.cancelled;
+  job.verify = event.verify;
   for (TaskFailed& failure : event.failures) {
     std::string task = failure.task;
     job.failed_before.emplace(std::move(task), std::move(failure));
@@ -69,8 +70,7 @@ void Transition::On(CancelJob& event) {
   const auto found = state_.job_by_id.find(event.job);
   if (found == state_.job_by_id.end()) return;
   Job& job = state_.jobs[found->second];
-  const bool over = job.complete && std::all_of(job.tasks.begin(), job.tasks.end(), [this](TaskIndex task) { return HasEnded(state_.tasks[task]); });
-  if (job.cancelled || over) return;
+  if (job.cancelled || IsOver(job)) return;
   job.cancelled = true;
   effects_.records.push_back(JobCancelled{job.id});
   StopJob(found->second);
@@ -80,12 +80,23 @@ void Transition::On(RetryJob& event) {
   const auto found = state_.job_by_id.find(event.job);
   if (found == state_.job_by_id.end()) return;
   Job& job = state_.jobs[found->second];
+  const bool over = IsOver(job);
+  job.verify = job.verify || over;
   job.cancelled = false;
   job.stopped = job.impossible;
   job.failed_before.clear();
   effects_.records.push_back(JobRetried{job.id});
-  ResetTasks(found->second);
+  ResetTasks(found->second, over);
   Changed(found->second);
+}
+
+void Transition::On(JobForgotten& event) {
+  const auto found = state_.job_by_id.find(event.job);
+  if (found == state_.job_by_id.end() || !IsOver(state_.jobs[found->second])) return;
+  Job& job = state_.jobs[found->second];
+  for (const TaskIndex task : job.tasks) state_.tasks.Forget(task);
+  job = Job{};
+  state_.job_by_id.erase(found);
 }
 
 }  // namespace vorocast::core

@@ -42,6 +42,16 @@ tasks::TaskSpec SpecOf(const State& state, const Task& task) {
   return spec;
 }
 
+bool IsOver(const Job& job) {
+  constexpr Phase kOpen[] = {Phase::kBlocked, Phase::kReady, Phase::kRunning};
+  for (const KindCounts& counts : job.counts) {
+    for (const Phase phase : kOpen) {
+      if (counts.phase[static_cast<std::size_t>(phase)] > 0) return false;
+    }
+  }
+  return job.complete;
+}
+
 const Job* FindJob(const State& state, const std::string& id) {
   const auto found = state.job_by_id.find(id);
   return found == state.job_by_id.end() ? nullptr : &state.jobs[found->second];

@@ -14,6 +14,7 @@
 
 #include "absl/container/flat_hash_map.h"
 #include "absl/time/time.h"
+#include "scheduler/core/block_table.h"
 #include "scheduler/core/event.h"
 #include "scheduler/core/record.h"
 
@@ -58,7 +59,7 @@ struct TaskInput {
 };
 
 struct Task {
-  JobIndex job = kNone;
+  JobIndex job = kNone;  // kNone: forgotten
   tasks::Kind kind = tasks::Kind::kTessellate;
   std::string name;
   std::shared_ptr<const nlohmann::json> options;  // shared by tasks with equal ones
@@ -111,6 +112,7 @@ struct Job {
   std::int32_t priority = 0;
   bool complete = false;  // every task is planned
   bool cancelled = false;
+  bool verify = false;                    // results that exist are read before they are believed
   std::optional<std::string> stopped;     // why nothing more is started: too many bad frames, or the rest cannot be planned
   std::optional<std::string> impossible;  // the part of `stopped` that a retry does not forget
   std::int32_t bad_frames_max = -1;
@@ -160,7 +162,7 @@ struct State {
   Settings settings;
   std::vector<Job> jobs;
   absl::flat_hash_map<std::string, JobIndex> job_by_id;
-  std::vector<Task> tasks;
+  BlockTable<Task> tasks;
   std::vector<Run> runs;
   std::vector<RunIndex> free_runs;
   absl::flat_hash_map<base::Digest, RunIndex> run_by_key;
@@ -183,6 +185,8 @@ Phase PhaseOf(const State& state, const Task& task);
 inline bool HasEnded(const Task& task) { return !std::holds_alternative<Blocked>(task.state) && !std::holds_alternative<Wanted>(task.state); }
 /// With the inputs as they are now; those that failed are missing. All inputs must have ended.
 tasks::TaskSpec SpecOf(const State& state, const Task& task);
+/// Every task is known and has ended; a retry may make it go on.
+bool IsOver(const Job& job);
 const Job* FindJob(const State& state, const std::string& id);
 
 }  // namespace vorocast::core

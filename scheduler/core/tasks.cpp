@@ -119,7 +119,7 @@ void Transition::Want(TaskIndex index) {
   }
   state_.run_by_key.emplace(key, run_index);
   Join(run_index, index);
-  effects_.look_ups.push_back({key, std::string(tasks::Extension(task.kind))});
+  effects_.look_ups.push_back({key, std::string(tasks::Extension(task.kind)), state_.jobs[task.job].verify});
 }
 
 void Transition::FlowEndings() {
@@ -149,13 +149,13 @@ void Transition::StopJob(JobIndex index) {
   Changed(index);
 }
 
-void Transition::ResetTasks(JobIndex job_index) {
-  // Failed and cancelled tasks and all that read them, also results made without them: their inputs, and so their keys, may change.
+void Transition::ResetTasks(JobIndex job_index, bool all) {
+  // Also results made without the failed ones: their inputs, and so their keys, may change.
   std::vector<TaskIndex> reset;
   std::set<TaskIndex> seen;
   for (const TaskIndex task : state_.jobs[job_index].tasks) {
     const TaskState& state = state_.tasks[task].state;
-    if (std::holds_alternative<Failed>(state) || std::holds_alternative<Cancelled>(state)) {
+    if (all || std::holds_alternative<Failed>(state) || std::holds_alternative<Cancelled>(state)) {
       if (seen.insert(task).second) reset.push_back(task);
     }
   }

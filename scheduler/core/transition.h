@@ -26,6 +26,7 @@ class Transition {
   void On(TasksAdded& event);
   void On(CancelJob& event);
   void On(RetryJob& event);
+  void On(JobForgotten& event);
   // runs.cpp
   void On(LookUpAnswered& event);
   void On(Finished& event);
@@ -53,7 +54,8 @@ class Transition {
   void Want(TaskIndex task);
   void FlowEndings();
   void StopJob(JobIndex job);
-  void ResetTasks(JobIndex job);
+  /// Failed and cancelled tasks and all that read them, or all tasks.
+  void ResetTasks(JobIndex job, bool all);
 
   // Runs (runs.cpp).
   void Join(RunIndex run, TaskIndex task);

@@ -75,7 +75,7 @@ absl::Status Fill(const absl::StatusOr<const CatalogueSequence*>& sequence, v1::
   reply.set_frames_per_second(opened.frames_per_second);
   reply.set_metres_per_unit(opened.metres_per_unit);
   reply.set_up(opened.up);
-  reply.set_frame_count(static_cast<std::int32_t>((*sequence)->frames.size()));
+  reply.set_frame_count(static_cast<std::int32_t>((*sequence)->frame_count));
   reply.set_closed((*sequence)->closed);
   return absl::OkStatus();
 }

@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "scheduler/server/catalogue.h"
 
+#include <algorithm>
+
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include "scheduler/core/state.h"
 #include "services/base/status.h"
 
 namespace vorocast::server {
@@ -18,21 +21,24 @@ std::vector<plan::PlannedFrame> PlannedFrames(const std::vector<store::FrameAdde
 
 std::vector<store::FrameAdded> AllFrames(const CatalogueSequence& sequence) {
   std::vector<store::FrameAdded> frames;
-  for (const auto& [number, frame] : sequence.frames) frames.push_back(frame);
+  for (const auto& [number, frame] : *sequence.frames) frames.push_back(frame);
   return frames;
+}
+
+absl::StatusOr<plan::JobSpec> SpecOf(const CatalogueJob& job) {
+  return plan::JobSpecFromJson(nlohmann::json::parse(job.added.spec_json, nullptr, false));
 }
 
 }  // namespace
 
 void Catalogue::Plan(Turn& turn, const CatalogueJob& job, const CatalogueSequence& sequence, const std::vector<store::FrameAdded>& frames) const {
-  core::TasksAdded added{.job = job.added.id};
-  if (job.spec.interpolated_max >= 0) added.bad_frames_max = job.spec.interpolated_max;
-  if (sequence.closed) {
-    added.complete = true;
-    added.bad_frames_max = plan::InterpolatedMax(job.spec, static_cast<std::int32_t>(sequence.frames.size()));
-  }
-  auto planned = plan::Plan(job.spec, PlannedFrames(frames), sequence.closed);
+  core::TasksAdded added{.job = job.added.id, .complete = sequence.closed};
+  const auto spec = SpecOf(job);
+  auto planned =
+      spec.ok() ? plan::Plan(*spec, PlannedFrames(frames), sequence.closed) : absl::StatusOr<std::vector<plan::PlannedTask>>(spec.status());
   if (planned.ok()) {
+    if (spec->interpolated_max >= 0) added.bad_frames_max = spec->interpolated_max;
+    if (sequence.closed) added.bad_frames_max = plan::InterpolatedMax(*spec, static_cast<std::int32_t>(sequence.frame_count));
     added.tasks = *std::move(planned);
   } else {
     added.impossible = std::string(planned.status().message());
@@ -40,8 +46,18 @@ void Catalogue::Plan(Turn& turn, const CatalogueJob& job, const CatalogueSequenc
   turn.Apply(std::move(added));
 }
 
-void Catalogue::PlanWhole(Turn& turn, const CatalogueJob& job, const CatalogueSequence& sequence) const {
+absl::Status Catalogue::NeedFrames(CatalogueSequence& sequence) const {
+  if (sequence.frames) return absl::OkStatus();
+  ASSIGN_OR_RETURN(std::vector<store::FrameAdded> frames, store_.LoadFrames(sequence.opened.id));
+  sequence.frames.emplace();
+  for (store::FrameAdded& frame : frames) sequence.frames->emplace(frame.number, std::move(frame));
+  return absl::OkStatus();
+}
+
+absl::Status Catalogue::PlanWhole(Turn& turn, const CatalogueJob& job, CatalogueSequence& sequence) const {
+  RETURN_IF_ERROR(NeedFrames(sequence));
   Plan(turn, job, sequence, AllFrames(sequence));
+  return absl::OkStatus();
 }
 
 absl::Status Catalogue::Restore(Turn& turn, store::Snapshot snapshot) {
@@ -52,33 +68,44 @@ absl::Status Catalogue::Restore(Turn& turn, store::Snapshot snapshot) {
     CatalogueSequence& sequence = sequences_[id];
     sequence.opened = std::move(stored.opened);
     sequence.closed = stored.closed;
-    for (store::FrameAdded& frame : stored.frames) sequence.frames.emplace(frame.number, std::move(frame));
+    sequence.frame_count = stored.frame_count;
+    if (!stored.frames) continue;
+    sequence.frames.emplace();
+    for (store::FrameAdded& frame : *stored.frames) sequence.frames->emplace_hint(sequence.frames->end(), frame.number, std::move(frame));
   }
   for (store::StoredJob& stored : snapshot.jobs) {
     const std::string id = stored.added.id;
     const auto sequence = sequences_.find(stored.added.sequence);
     if (sequence == sequences_.end())
       return absl::DataLossError(fmt::format("job {} belongs to sequence {}, which is not on record", id, stored.added.sequence));
-    const auto json = nlohmann::json::parse(stored.added.spec_json, nullptr, false);
-    auto spec = plan::JobSpecFromJson(json);
-    if (!spec.ok()) {
-      // One job that a later version cannot read must not keep the others from going on.
-      spdlog::error("job passed over: job={} error=\"{}\"", id, std::string(spec.status().message()));
-      continue;
-    }
     CatalogueJob& job = jobs_[id];
-    job = {.added = std::move(stored.added), .spec = *std::move(spec)};
+    job = {.added = std::move(stored.added), .ended = stored.ended};
     job_order_.push_back(id);
     sequence->second.jobs.push_back(id);
+    if (job.ended) continue;
     turn.Apply(core::JobSubmitted{.id = id,
                                   .name = sequence->second.opened.name,
                                   .user = job.added.user,
                                   .priority = job.added.priority,
                                   .cancelled = stored.cancelled,
                                   .failures = std::move(stored.failures)});
-    PlanWhole(turn, job, sequence->second);
+    unplanned_.push_back(id);
   }
+  std::stable_sort(unplanned_.begin(), unplanned_.end(),
+                   [this](const std::string& a, const std::string& b) { return jobs_.at(a).added.priority > jobs_.at(b).added.priority; });
   return absl::OkStatus();
+}
+
+bool Catalogue::PlanNext(Turn& turn) {
+  if (unplanned_.empty()) return false;
+  const CatalogueJob& job = jobs_.at(unplanned_.front());
+  const absl::Status status = PlanWhole(turn, job, sequences_.at(job.added.sequence));
+  if (!status.ok()) {
+    // One job that cannot be read must not keep the others from going on.
+    spdlog::error("job passed over: job={} error=\"{}\"", job.added.id, std::string(status.message()));
+  }
+  unplanned_.pop_front();
+  return !unplanned_.empty();
 }
 
 absl::StatusOr<const CatalogueSequence*> Catalogue::Open(Turn& turn, store::SequenceOpened asked) {
@@ -98,6 +125,7 @@ absl::StatusOr<const CatalogueSequence*> Catalogue::Open(Turn& turn, store::Sequ
   turn.Record(asked);
   CatalogueSequence& sequence = sequences_[asked.id];
   sequence.opened = std::move(asked);
+  sequence.frames.emplace();
   return &sequence;
 }
 
@@ -105,21 +133,26 @@ absl::StatusOr<const CatalogueSequence*> Catalogue::Add(Turn& turn, const std::s
   const auto found = sequences_.find(id);
   if (found == sequences_.end()) return FindSequence(id);
   CatalogueSequence& sequence = found->second;
+  const bool was_needed = sequence.frames.has_value();
+  RETURN_IF_ERROR(NeedFrames(sequence));
   std::map<std::int32_t, store::FrameAdded> fresh;
   for (store::FrameAdded& frame : frames) {
     frame.sequence = id;
     const std::int32_t number = frame.number;
-    const auto known = sequence.frames.find(number);
+    const auto known = sequence.frames->find(number);
     const auto repeated = fresh.find(number);
-    const store::FrameAdded* before = known != sequence.frames.end() ? &known->second : repeated != fresh.end() ? &repeated->second : nullptr;
+    const store::FrameAdded* before = known != sequence.frames->end() ? &known->second : repeated != fresh.end() ? &repeated->second : nullptr;
     if (!before) {
       fresh.emplace(number, std::move(frame));
     } else if (before->blob != frame.blob || before->extension != frame.extension) {
       return absl::AlreadyExistsError(fmt::format("frame {} stands for another file already ({})", number, before->blob.Short()));
     }
   }
-  if (fresh.empty()) return &sequence;
-  if (sequence.frames.size() + fresh.size() > tasks::kFramesMax) {
+  if (fresh.empty()) {
+    if (!was_needed) sequence.frames.reset();
+    return &sequence;
+  }
+  if (sequence.frames->size() + fresh.size() > tasks::kFramesMax) {
     return absl::InvalidArgumentError(fmt::format("a take has at most {} frames; split it", tasks::kFramesMax));
   }
   if (sequence.closed) {
@@ -129,9 +162,10 @@ absl::StatusOr<const CatalogueSequence*> Catalogue::Add(Turn& turn, const std::s
   std::vector<store::FrameAdded> added;
   for (auto& [number, frame] : fresh) {
     turn.Record(frame);
-    sequence.frames.emplace(number, frame);
+    sequence.frames->emplace(number, frame);
     added.push_back(std::move(frame));
   }
+  sequence.frame_count = static_cast<std::int64_t>(sequence.frames->size());
   for (const std::string& job : sequence.jobs) Plan(turn, jobs_.at(job), sequence, added);
   return &sequence;
 }
@@ -143,7 +177,7 @@ absl::StatusOr<const CatalogueSequence*> Catalogue::Close(Turn& turn, const std:
   if (sequence.closed) return &sequence;
   sequence.closed = true;
   turn.Record(store::SequenceClosed{id});
-  for (const std::string& job : sequence.jobs) PlanWhole(turn, jobs_.at(job), sequence);
+  for (const std::string& job : sequence.jobs) RETURN_IF_ERROR(PlanWhole(turn, jobs_.at(job), sequence));
   return &sequence;
 }
 
@@ -151,16 +185,42 @@ absl::StatusOr<std::string> Catalogue::Submit(Turn& turn, const std::string& seq
                                               plan::JobSpec spec) {
   const auto found = sequences_.find(sequence_id);
   if (found == sequences_.end()) return FindSequence(sequence_id).status();
+  RETURN_IF_ERROR(NeedFrames(found->second));
   const std::string id = fmt::format("j{}", jobs_.size() + 1);
   CatalogueJob& job = jobs_[id];
   job.added = {.id = id, .sequence = sequence_id, .user = user, .priority = priority, .spec_json = plan::ToJson(spec).dump()};
-  job.spec = std::move(spec);
   job_order_.push_back(id);
   found->second.jobs.push_back(id);
   turn.Record(job.added);
   turn.Apply(core::JobSubmitted{.id = id, .name = found->second.opened.name, .user = user, .priority = priority});
-  PlanWhole(turn, job, found->second);
+  RETURN_IF_ERROR(PlanWhole(turn, job, found->second));
   return id;
+}
+
+absl::Status Catalogue::Retry(Turn& turn, const std::string& id) {
+  RETURN_IF_ERROR(FindJob(id).status());
+  CatalogueJob& job = jobs_.at(id);
+  job.ended = false;
+  if (core::FindJob(turn.state(), id)) {
+    turn.Apply(core::RetryJob{id});
+    return absl::OkStatus();
+  }
+  CatalogueSequence& sequence = sequences_.at(job.added.sequence);
+  if (const absl::Status status = NeedFrames(sequence); !status.ok()) {
+    job.ended = true;
+    return status;
+  }
+  turn.Record(core::Record(core::JobRetried{id}));
+  turn.Apply(core::JobSubmitted{.id = id, .name = sequence.opened.name, .user = job.added.user, .priority = job.added.priority, .verify = true});
+  return PlanWhole(turn, job, sequence);
+}
+
+void Catalogue::End(const std::string& id) {
+  CatalogueJob& job = jobs_.at(id);
+  job.ended = true;
+  CatalogueSequence& sequence = sequences_.at(job.added.sequence);
+  const bool unused = std::all_of(sequence.jobs.begin(), sequence.jobs.end(), [this](const std::string& other) { return jobs_.at(other).ended; });
+  if (sequence.closed && unused) sequence.frames.reset();
 }
 
 absl::StatusOr<const CatalogueSequence*> Catalogue::FindSequence(const std::string& id) const {

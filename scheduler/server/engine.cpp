@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "scheduler/server/engine.h"
 
+#include <algorithm>
 #include <chrono>
-#include <cstdlib>
+#include <utility>
 
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include "scheduler/core/step.h"
 #include "services/base/check.h"
+#include "services/base/status.h"
 
 namespace vorocast::server {
 namespace {
@@ -15,8 +18,11 @@ namespace {
 constexpr std::size_t kQueueMax = 100'000;
 constexpr std::size_t kTurnMax = 4'000;  // commands a turn: answers do not wait for an endless queue
 constexpr auto kTick = std::chrono::milliseconds(50);
-constexpr int kCommitAttempts = 30;
-constexpr auto kCommitPause = std::chrono::seconds(1);
+constexpr auto kCommitPauseFirst = std::chrono::milliseconds(20);
+constexpr auto kCommitPauseLast = std::chrono::milliseconds(500);
+/// An engine that is told to stop tries that often to make its last turn durable.
+constexpr int kLastAttempts = 5;
+constexpr int kAttemptsALogLine = 20;
 
 void Log(const core::Record& record) {
   if (const auto* failed = std::get_if<core::TaskFailed>(&record)) {
@@ -48,7 +54,7 @@ void Engine::Prepare(const Command& command) {
   Turn turn(state_, MonotonicNow());
   command(turn);
   VOROCAST_CHECK(turn.messages_.empty());
-  Commit(turn.records_);
+  if (!Commit(turn).ok()) return;
   for (const auto& action : turn.after_) action();
   std::move(turn.look_ups_.begin(), turn.look_ups_.end(), std::back_inserter(early_look_ups_));
 }
@@ -76,6 +82,15 @@ bool Engine::Submit(Command command) {
   }
   wake_.notify_one();
   return true;
+}
+
+absl::Status Engine::Ask(Command command) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (!stalled_.ok()) return stalled_;
+  }
+  if (Submit(std::move(command))) return absl::OkStatus();
+  return absl::UnavailableError("the scheduler is stopping or overloaded; try again");
 }
 
 void Engine::Enqueue(Command command) {
@@ -107,29 +122,56 @@ void Engine::Run() {
       next_tick = std::chrono::steady_clock::now() + kTick;
     }
     adapters_.changed(turn, turn.changed_jobs_);
-    Finish(turn);
+    if (!Finish(turn).ok()) return;
   }
 }
 
-void Engine::Finish(Turn& turn) {
-  Commit(turn.records_);
+absl::Status Engine::Finish(Turn& turn) {
+  const absl::Status durable = Commit(turn);
+  for (const auto& answer : turn.answers_) answer(durable);
+  RETURN_IF_ERROR(durable);
   for (const auto& action : turn.after_) action();
   for (core::Message& message : turn.messages_) adapters_.send(std::move(message));
   if (!turn.look_ups_.empty()) adapters_.look_up(std::move(turn.look_ups_));
+  return absl::OkStatus();
 }
 
-void Engine::Commit(const std::vector<store::Record>& records) {
-  if (records.empty()) return;
+void Engine::NoteStalled(Turn& turn, const absl::Status& status) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (!stalled_.ok()) return;
+    stalled_ = absl::Status(status.code(), fmt::format("the scheduler cannot write its state and waits: {}", std::string(status.message())));
+  }
+  for (const auto& answer : std::exchange(turn.answers_, {})) answer(stalled_);
+  if (adapters_.stalled) adapters_.stalled(stalled_);
+}
+
+absl::Status Engine::Commit(Turn& turn) {
+  if (turn.records_.empty()) return absl::OkStatus();
+  auto pause = kCommitPauseFirst;
+  int last_attempts = 0;
   for (int attempt = 1;; ++attempt) {
-    const absl::Status status = store_.Append(records);
-    if (status.ok()) return;
-    spdlog::error("commit failed: attempt={} records={} error=\"{}\"", attempt, records.size(), std::string(status.message()));
-    if (attempt == kCommitAttempts || absl::IsDataLoss(status)) {
-      spdlog::critical("giving up: start the scheduler again once its state folder can be written; workers go on meanwhile");
-      spdlog::shutdown();
-      std::_Exit(EXIT_FAILURE);
+    const absl::Status status = store_.Append(turn.records_);
+    if (status.ok()) {
+      const std::lock_guard lock(mutex_);
+      if (!stalled_.ok()) spdlog::info("commits go on: attempt={}", attempt);
+      stalled_ = absl::OkStatus();
+      return status;
     }
-    std::this_thread::sleep_for(kCommitPause);
+    if (attempt % kAttemptsALogLine == 1)
+      spdlog::error("commit failed: attempt={} records={} error=\"{}\"", attempt, turn.records_.size(), std::string(status.message()));
+    if (absl::IsFailedPrecondition(status) || absl::IsDataLoss(status)) {
+      lost_(status);
+      const std::lock_guard lock(mutex_);
+      stopping_ = true;
+      return status;
+    }
+    // A connection that broke while it was idle shows at the first attempt; a full disk does not go away so fast.
+    if (attempt > 1 || absl::IsResourceExhausted(status)) NoteStalled(turn, status);
+    std::unique_lock lock(mutex_);
+    wake_.wait_for(lock, pause, [this] { return stopping_; });
+    if (stopping_ && ++last_attempts == kLastAttempts) return status;
+    pause = std::min(2 * pause, kCommitPauseLast);
   }
 }
 

@@ -30,6 +30,8 @@ class Turn {
   void Record(store::Record record) { records_.push_back(std::move(record)); }
   /// Once the records of this turn are durable.
   void After(std::function<void()> action) { after_.push_back(std::move(action)); }
+  /// For somebody who waits: called once, with OK when the records of this turn are durable, or with the reason why that takes a while.
+  void Answer(std::function<void(const absl::Status&)> answer) { answers_.push_back(std::move(answer)); }
 
  private:
   friend class Engine;
@@ -37,6 +39,7 @@ class Turn {
   absl::Time now_;
   std::vector<store::Record> records_;
   std::vector<std::function<void()>> after_;
+  std::vector<std::function<void(const absl::Status&)>> answers_;
   std::vector<core::Message> messages_;
   std::vector<core::LookUp> look_ups_;
   std::set<std::string> changed_jobs_;
@@ -50,14 +53,19 @@ struct EngineAdapters {
   std::function<void(std::vector<core::LookUp>)> look_up;
   /// Jobs that changed since the last turn; called on every turn, also with none.
   std::function<void(Turn&, const std::set<std::string>&)> changed;
+  /// The store cannot be written for now; called on the engine's thread, once each time this begins.
+  std::function<void(const absl::Status&)> stalled;
 };
 
 /// The thread that owns the core's state. Commands queue up and are worked off in turns.
 class Engine {
  public:
-  /// `store` must outlive the engine. When it cannot be written for half a minute the process ends: the state in memory has gone ahead of
-  /// what is on record, and a fresh start is the way back.
-  explicit Engine(store::Store& store) : store_(store) {}
+  /// Told when nothing can be written any more: another scheduler leads (FAILED_PRECONDITION), or the store is damaged (DATA_LOSS). The state in
+  /// memory has gone ahead of what is on record then, so a fresh start is the only way back.
+  using Lost = std::function<void(const absl::Status&)>;
+  /// `store` must outlive the engine. While it cannot be written (a full disk, a database that is away) the engine waits and goes on by itself;
+  /// who asks meanwhile is told why.
+  Engine(store::Store& store, Lost lost) : store_(store), lost_(std::move(lost)) {}
   ~Engine() { Stop(); }
 
   /// Runs a command on the calling thread, before Start: nothing is sent and nobody is told, but records and look-ups count.
@@ -68,15 +76,20 @@ class Engine {
 
   /// False when the engine has stopped or too much is waiting.
   bool Submit(Command command);
+  /// The same for calls that somebody waits for, refused also while the store cannot be written: the status says why.
+  absl::Status Ask(Command command);
   /// For news that must not be lost however much is waiting, and whose number is bounded otherwise: an answered look-up, a stream's end.
   void Enqueue(Command command);
 
  private:
   void Run();
-  void Commit(const std::vector<store::Record>& records);
-  void Finish(Turn& turn);
+  /// When OK the turn's records are durable; an error is final.
+  absl::Status Commit(Turn& turn);
+  void NoteStalled(Turn& turn, const absl::Status& status);
+  absl::Status Finish(Turn& turn);
 
   store::Store& store_;
+  const Lost lost_;
   EngineAdapters adapters_;
   core::State state_;                         // the engine's thread, after Start
   std::vector<core::LookUp> early_look_ups_;  // from before Start
@@ -84,6 +97,7 @@ class Engine {
   std::condition_variable wake_;
   std::deque<Command> commands_;  // guarded by mutex_
   bool stopping_ = false;         // guarded by mutex_
+  absl::Status stalled_;          // guarded by mutex_; why the store cannot be written, or OK
   std::thread thread_;
 };
 

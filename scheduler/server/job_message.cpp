@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "scheduler/server/job_message.h"
 
+#include <fmt/format.h>
+
 #include "scheduler/core/job_view.h"
 #include "services/base/check.h"
 
@@ -27,10 +29,17 @@ v1::State StateOf(core::Phase phase) {
 
 }  // namespace
 
-v1::Job JobMessage(const core::State& state, const Catalogue& catalogue, const CatalogueJob& job, FrameOutputs frames) {
+absl::StatusOr<v1::Job> JobMessage(const core::State& state, const Catalogue& catalogue, const CatalogueJob& job, FrameOutputs frames) {
   const core::Job* known = core::FindJob(state, job.added.id);
+  if (!known) {
+    v1::Job ended;
+    ASSIGN_OR_RETURN(const std::string bytes,
+                     catalogue.EndedText(job.added.id, frames == FrameOutputs::kListed ? store::JobText::kWhole : store::JobText::kSummary));
+    if (!ended.ParseFromString(bytes)) return absl::DataLossError(fmt::format("the record of job {} cannot be read", job.added.id));
+    return ended;
+  }
   const auto sequence = catalogue.FindSequence(job.added.sequence);
-  VOROCAST_CHECK(known && sequence.ok());
+  VOROCAST_CHECK(sequence.ok());
   const core::JobView view = core::View(state, *known);
 
   v1::Job message;

@@ -5,10 +5,10 @@
 #include <spdlog/spdlog.h>
 
 #include "scheduler/core/job_view.h"
+#include "scheduler/server/archive.h"
 #include "scheduler/server/job_message.h"
 #include "scheduler/server/job_request.h"
 #include "scheduler/server/unary_call.h"
-#include "services/base/check.h"
 
 namespace vorocast::server {
 namespace {
@@ -16,14 +16,23 @@ namespace {
 constexpr std::int32_t kListed = 50;
 constexpr std::int32_t kListedMax = 10'000;
 
-const absl::Status kOverloaded = absl::UnavailableError("the scheduler is stopping or overloaded; try again");
-
 }  // namespace
 
 absl::Status JobsService::Show(Turn& turn, const std::string& id, v1::Job& reply) const {
   ASSIGN_OR_RETURN(const CatalogueJob* job, catalogue_.FindJob(id));
-  reply = JobMessage(turn.state(), catalogue_, *job, FrameOutputs::kListed);
+  ASSIGN_OR_RETURN(reply, JobMessage(turn.state(), catalogue_, *job, FrameOutputs::kListed));
   return absl::OkStatus();
+}
+
+absl::StatusOr<JobsService::OutputFile> JobsService::FindOutput(Turn& turn, const std::string& id, const std::string& name) const {
+  RETURN_IF_ERROR(catalogue_.FindJob(id).status());
+  if (const core::Job* job = core::FindJob(turn.state(), id)) {
+    ASSIGN_OR_RETURN(const core::OutputView output, core::FindOutput(turn.state(), *job, name));
+    return OutputFile{artifacts_.ArtifactPath(output.key, output.extension), output.result.sha256.Hex()};
+  }
+  ASSIGN_OR_RETURN(const v1::Output output, FindEndedOutput(catalogue_, id, name));
+  ASSIGN_OR_RETURN(const base::Digest key, base::Digest::FromHex(output.key()));
+  return OutputFile{artifacts_.ArtifactPath(key, std::filesystem::path(name).extension().string()), output.sha256()};
 }
 
 grpc::ServerUnaryReactor* JobsService::Submit(grpc::CallbackServerContext* context, const v1::SubmitJobRequest* request, v1::Job* reply) {
@@ -51,7 +60,7 @@ grpc::ServerUnaryReactor* JobsService::List(grpc::CallbackServerContext* context
     const auto& order = catalogue_.job_order();
     for (auto id = order.rbegin(); id != order.rend() && list.jobs_size() < limit; ++id) {
       ASSIGN_OR_RETURN(const CatalogueJob* job, catalogue_.FindJob(*id));
-      *list.add_jobs() = JobMessage(turn.state(), catalogue_, *job, FrameOutputs::kLeftOut);
+      ASSIGN_OR_RETURN(*list.add_jobs(), JobMessage(turn.state(), catalogue_, *job, FrameOutputs::kLeftOut));
     }
     return absl::OkStatus();
   });
@@ -59,12 +68,12 @@ grpc::ServerUnaryReactor* JobsService::List(grpc::CallbackServerContext* context
 
 grpc::ServerWriteReactor<v1::Job>* JobsService::Watch(grpc::CallbackServerContext*, const v1::JobRequest* request) {
   const std::shared_ptr<WatchCall> call = WatchCall::Make();
-  const bool accepted = engine_.Submit([this, call, id = request->job_id()](Turn& turn) {
+  const absl::Status accepted = engine_.Ask([this, call, id = request->job_id()](Turn& turn) {
     const auto job = catalogue_.FindJob(id);
     if (!job.ok()) return turn.After([call, status = job.status()] { call->End(status); });
     watchers_.Add(turn, **job, call);
   });
-  if (!accepted) call->End(kOverloaded);
+  if (!accepted.ok()) call->End(accepted);
   return call.get();
 }
 
@@ -72,7 +81,10 @@ grpc::ServerUnaryReactor* JobsService::Explain(grpc::CallbackServerContext* cont
   return AnswerInTurn<v1::ExplainReply>(context, engine_, reply, [this, request](Turn& turn, v1::ExplainReply& explained) -> absl::Status {
     RETURN_IF_ERROR(catalogue_.FindJob(request->job_id()).status());
     const core::Job* job = core::FindJob(turn.state(), request->job_id());
-    VOROCAST_CHECK(job);
+    if (!job) {
+      ASSIGN_OR_RETURN(*explained.mutable_text(), ExplainEnded(catalogue_, request->job_id(), request->task()));
+      return absl::OkStatus();
+    }
     if (request->task().empty()) {
       explained.set_text(core::Explain(turn.state(), *job));
       return absl::OkStatus();
@@ -90,22 +102,20 @@ grpc::ServerUnaryReactor* JobsService::Cancel(grpc::CallbackServerContext* conte
 }
 
 grpc::ServerUnaryReactor* JobsService::Retry(grpc::CallbackServerContext* context, const v1::JobRequest* request, v1::Job* reply) {
-  return AnswerInTurn<v1::Job>(context, engine_, reply, [this, request](Turn& turn, v1::Job& job) {
-    turn.Apply(core::RetryJob{request->job_id()});
+  return AnswerInTurn<v1::Job>(context, engine_, reply, [this, request](Turn& turn, v1::Job& job) -> absl::Status {
+    RETURN_IF_ERROR(catalogue_.Retry(turn, request->job_id()));
     return Show(turn, request->job_id(), job);
   });
 }
 
 grpc::ServerWriteReactor<v1::FetchChunk>* JobsService::Fetch(grpc::CallbackServerContext*, const v1::FetchRequest* request) {
   auto* call = new FetchCall(disk_);
-  const bool accepted = engine_.Submit([this, call, id = request->job_id(), name = request->name()](Turn& turn) {
-    const core::Job* job = core::FindJob(turn.state(), id);
-    const auto output = job ? core::FindOutput(turn.state(), *job, name) : absl::StatusOr<core::OutputView>(catalogue_.FindJob(id).status());
+  const absl::Status accepted = engine_.Ask([this, call, id = request->job_id(), name = request->name()](Turn& turn) {
+    const auto output = FindOutput(turn, id, name);
     if (!output.ok()) return turn.After([call, status = output.status()] { call->Refuse(status); });
-    turn.After(
-        [call, path = artifacts_.ArtifactPath(output->key, output->extension), sha256 = output->result.sha256.Hex()] { call->Send(path, sha256); });
+    turn.After([call, path = output->path, sha256 = output->sha256] { call->Send(path, sha256); });
   });
-  if (!accepted) call->Refuse(kOverloaded);
+  if (!accepted.ok()) call->Refuse(accepted);
   return call;
 }
 

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
+#include <filesystem>
+#include <string>
+
 #include "proto/jobs.grpc.pb.h"
 #include "scheduler/server/catalogue.h"
 #include "scheduler/server/disk_threads.h"
@@ -28,6 +31,11 @@ class JobsService final : public v1::Jobs::CallbackService {
   grpc::ServerWriteReactor<v1::FetchChunk>* Fetch(grpc::CallbackServerContext* context, const v1::FetchRequest* request) override;
 
  private:
+  struct OutputFile {
+    std::filesystem::path path;
+    std::string sha256;
+  };
+  absl::StatusOr<OutputFile> FindOutput(Turn& turn, const std::string& id, const std::string& name) const;
   /// Fills `reply` with the job as it is now.
   absl::Status Show(Turn& turn, const std::string& id, v1::Job& reply) const;
 

@@ -11,6 +11,22 @@ namespace {
 
 constexpr std::size_t kAnswersAtOnce = 256;
 
+/// A damaged file is moved aside, where whoever looks for the cause finds it, so that the result can be made again under its name.
+bool IsDamaged(const std::filesystem::path& path, const core::Result& result, bool verify) {
+  std::error_code error;
+  const auto size = std::filesystem::file_size(path, error);
+  if (error) return true;
+  bool damaged = static_cast<std::int64_t>(size) != result.size;
+  if (!damaged && verify) {
+    const auto sha256 = base::HashFile(path);
+    damaged = !sha256.ok() || *sha256 != result.sha256;
+  }
+  if (!damaged) return false;
+  spdlog::error("a result is damaged and will be made again: file={}", path.string());
+  std::filesystem::rename(path, path.string() + ".damaged", error);
+  return true;
+}
+
 }  // namespace
 
 LookUpThread::LookUpThread(store::Store& store, const storage::ArtifactStore& artifacts, Answers answers)
@@ -53,14 +69,15 @@ void LookUpThread::Run() {
 core::LookUpAnswered LookUpThread::Answer(const core::LookUp& look_up) const {
   core::LookUpAnswered answer{.key = look_up.key};
   if (!artifacts_.HasArtifact(look_up.key, look_up.extension)) return answer;
+  const std::filesystem::path path = artifacts_.ArtifactPath(look_up.key, look_up.extension);
   auto on_record = store_.FindResult(look_up.key);
   if (!on_record.ok()) spdlog::error("look-up failed: key={} error=\"{}\"", look_up.key.Hex(), std::string(on_record.status().message()));
   if (on_record.ok() && *on_record) {
+    if (IsDamaged(path, **on_record, look_up.verify)) return answer;
     answer.result = std::move(**on_record);
     answer.recorded = true;
     return answer;
   }
-  const std::filesystem::path path = artifacts_.ArtifactPath(look_up.key, look_up.extension);
   const auto sha256 = base::HashFile(path);
   std::error_code error;
   const auto size = std::filesystem::file_size(path, error);

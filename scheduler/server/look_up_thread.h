@@ -16,7 +16,7 @@
 namespace vorocast::server {
 
 /// Answers whether results exist: on record and as a file. A file without a record (its report was lost) is taken up; a record without
-/// its file is not believed.
+/// its file, or with a file of another size, is not believed.
 class LookUpThread {
  public:
   using Answers = std::function<void(std::vector<core::LookUpAnswered>)>;

@@ -18,6 +18,8 @@
 
 #include "scheduler/fleet/local_fleet.h"
 #include "scheduler/server/scheduler_server.h"
+#include "scheduler/server/standby.h"
+#include "scheduler/store/postgres_store.h"
 #include "services/base/processor.h"
 
 namespace vorocast::server {
@@ -25,6 +27,7 @@ namespace {
 
 struct Options {
   std::string state;
+  std::string database;
   std::string listen;
   std::int32_t workers = 0;
   bool simulation = false;
@@ -79,7 +82,15 @@ absl::Status Serve(const Options& options, const sigset_t& stop_signals) {
   const std::filesystem::path state = std::filesystem::absolute(options.state).lexically_normal();
   RETURN_IF_ERROR(StartLog(state));
   const std::string listen = options.listen.empty() ? StableAddress(state) : options.listen;
-  ASSIGN_OR_RETURN(std::unique_ptr<SchedulerServer> server, SchedulerServer::Start({.state = state, .listen = listen}));
+  std::unique_ptr<SchedulerServer> server;
+  if (options.database.empty()) {
+    ASSIGN_OR_RETURN(server, SchedulerServer::Start({.state = state, .listen = listen}));
+  } else {
+    ASSIGN_OR_RETURN(std::unique_ptr<store::Store> store, store::OpenPostgresStore(options.database));
+    ASSIGN_OR_RETURN(const std::optional<std::string> address, AwaitLeadership(*store, listen, stop_signals));
+    if (!address) return absl::OkStatus();
+    ASSIGN_OR_RETURN(server, SchedulerServer::Start({.state = state, .listen = *address}, std::move(store)));
+  }
   std::unique_ptr<fleet::LocalFleet> fleet;
   if (options.workers > 0 || options.simulation) {
     const std::filesystem::path programs = std::filesystem::read_symlink("/proc/self/exe").parent_path();
@@ -102,6 +113,11 @@ absl::Status Serve(const Options& options, const sigset_t& stop_signals) {
   return absl::OkStatus();
 }
 
+absl::Status Validate(const Options& options) {
+  if (options.database.empty() || !options.listen.empty()) return absl::OkStatus();
+  return absl::InvalidArgumentError("--database needs --listen HOST:PORT: a scheduler that stands by has an address of its own");
+}
+
 int Main(int argc, char** argv) {
   // Before any thread starts, so that all of them leave these signals to sigwait.
   sigset_t stop_signals;
@@ -114,12 +130,16 @@ int Main(int argc, char** argv) {
   CLI::App app("Vorocast's scheduler: splits takes into tasks and leases them to workers");
   Options options;
   app.add_option("--state", options.state, "Folder for the database, the artifacts and the logs; created if need be")->required();
+  app.add_option("--database", options.database,
+                 "postgresql://USER@HOST/NAME (default: SQLite in the state folder). Several schedulers may name one database and share the state "
+                 "folder: one leads, the others stand by. The password comes from ~/.pgpass or PGPASSWORD");
   app.add_option("--listen", options.listen, "HOST:PORT or unix:/path (default: a socket in the state folder)");
   app.add_option("--workers", options.workers, "Workers to run on this machine")->check(CLI::Range(0, 1024));
   app.add_flag("--simulation", options.simulation, "Run a simulation service on this machine too");
   CLI11_PARSE(app, argc, argv);
 
-  const absl::Status status = Serve(options, stop_signals);
+  absl::Status status = Validate(options);
+  if (status.ok()) status = Serve(options, stop_signals);
   if (status.ok()) return 0;
   fmt::print(stderr, "vorocast-scheduler: {}\n", std::string(status.message()));
   return 1;

@@ -1,15 +1,18 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "scheduler/server/scheduler_server.h"
 
+#include <cstdlib>
+
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include "scheduler/server/archive.h"
 #include "scheduler/server/captures_service.h"
 #include "scheduler/server/dispatch_service.h"
 #include "scheduler/server/jobs_service.h"
+#include "scheduler/server/leadership_watch.h"
 #include "scheduler/server/look_up_thread.h"
 #include "scheduler/store/sqlite_store.h"
-#include "scheduler/store/state_lock.h"
 #include "services/rpc/server.h"
 
 namespace vorocast::server {
@@ -18,19 +21,30 @@ namespace {
 constexpr int kDiskThreads = 4;
 constexpr absl::Duration kStopGrace = absl::Seconds(1);
 
+void EndProcess(const absl::Status& why) {
+  const bool fenced = absl::IsFailedPrecondition(why);
+  spdlog::critical("{}: {}{}", fenced ? "stepping down" : "giving up", std::string(why.message()),
+                   fenced ? "; workers go on with the other one, and this one may be started again to stand by" : "");
+  spdlog::shutdown();
+  std::_Exit(fenced ? kSteppedDown : EXIT_FAILURE);
+}
+
 }  // namespace
 
 /// In the order they are made; the destructor ends them in the order that none is used after its end.
 struct SchedulerServer::Parts {
-  Parts(store::StateLock taken, std::unique_ptr<store::Store> opened, storage::ArtifactStore folder)
-      : lock(std::move(taken)), store(std::move(opened)), artifacts(std::move(folder)) {}
+  Parts(std::unique_ptr<store::Store> leading, storage::ArtifactStore folder, std::function<void(const absl::Status&)> on_lost)
+      : lost(std::move(on_lost)), store(std::move(leading)), artifacts(std::move(folder)) {}
 
-  store::StateLock lock;
+  const std::function<void(const absl::Status&)> lost;
   std::unique_ptr<store::Store> store;
+  /// From the start: a long queue is read before anything is written.
+  LeadershipWatch leadership{*store, lost};
   storage::ArtifactStore artifacts;
-  Engine engine{*store};
-  Catalogue catalogue;
+  Engine engine{*store, lost};
+  Catalogue catalogue{*store};
   Watchers watchers{catalogue};
+  Archive archive{catalogue};
   std::unique_ptr<DiskThreads> disk = std::make_unique<DiskThreads>(kDiskThreads);
   CapturesService captures{engine, catalogue, artifacts, *disk};
   JobsService jobs{engine, catalogue, watchers, artifacts, *disk};
@@ -40,6 +54,7 @@ struct SchedulerServer::Parts {
 
   absl::Status Restore();
   void StartEngine();
+  void PlanNext();
   ~Parts();
 };
 
@@ -59,7 +74,19 @@ void SchedulerServer::Parts::StartEngine() {
   });
   engine.Start({.send = [this](core::Message message) { dispatch.Send(std::move(message)); },
                 .look_up = [this](std::vector<core::LookUp> asked) { look_ups->Ask(std::move(asked)); },
-                .changed = [this](Turn& turn, const std::set<std::string>& changed) { watchers.Changed(turn, changed); }});
+                .changed =
+                    [this](Turn& turn, const std::set<std::string>& changed) {
+                      watchers.Changed(turn, changed);
+                      archive.Changed(turn, changed);
+                    },
+                .stalled = [this](const absl::Status& why) { watchers.EndAll(why); }});
+  PlanNext();
+}
+
+void SchedulerServer::Parts::PlanNext() {
+  engine.Enqueue([this](Turn& turn) {
+    if (catalogue.PlanNext(turn)) turn.After([this] { PlanNext(); });
+  });
 }
 
 SchedulerServer::Parts::~Parts() {
@@ -83,10 +110,14 @@ absl::StatusOr<std::unique_ptr<SchedulerServer>> SchedulerServer::Start(const Sc
   std::error_code error;
   std::filesystem::create_directories(options.state, error);
   if (error) return absl::UnavailableError(fmt::format("{}: cannot be created: {}", options.state.string(), error.message()));
-  ASSIGN_OR_RETURN(store::StateLock lock, store::StateLock::Take(options.state));
   ASSIGN_OR_RETURN(std::unique_ptr<store::Store> store, store::OpenSqliteStore(options.state / "scheduler.db"));
+  RETURN_IF_ERROR(store->Lead(options.listen).status());
+  return Start(options, std::move(store));
+}
+
+absl::StatusOr<std::unique_ptr<SchedulerServer>> SchedulerServer::Start(const SchedulerOptions& options, std::unique_ptr<store::Store> store) {
   ASSIGN_OR_RETURN(storage::ArtifactStore artifacts, storage::ArtifactStore::Open(options.state));
-  auto parts = std::make_unique<Parts>(std::move(lock), std::move(store), std::move(artifacts));
+  auto parts = std::make_unique<Parts>(std::move(store), std::move(artifacts), options.lost ? options.lost : EndProcess);
   RETURN_IF_ERROR(parts->Restore());
   parts->StartEngine();
   ASSIGN_OR_RETURN(parts->server, rpc::StartServer({.listen = options.listen, .services = {&parts->captures, &parts->jobs, &parts->dispatch}}));

@@ -2,17 +2,24 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <string>
 
+#include "scheduler/store/store.h"
 #include "services/base/status.h"
 
 namespace vorocast::server {
 
 struct SchedulerOptions {
-  std::filesystem::path state;  // holds scheduler.db and the artifact folder
+  std::filesystem::path state;  // holds the artifact folder, and scheduler.db unless the state is kept elsewhere
   std::string listen;           // host:port or unix:/path
+  /// Told, from any thread, when this scheduler must not go on: another leads, or its store is damaged. By default the process ends.
+  std::function<void(const absl::Status&)> lost;
 };
+
+/// The exit code of a scheduler that has stepped down: start it again, and it stands by.
+inline constexpr int kSteppedDown = 75;
 
 /// A whole scheduler: its memory, its core and its three services. Goes on from what the state folder remembers.
 class SchedulerServer {
@@ -20,6 +27,8 @@ class SchedulerServer {
   /// Errors: FAILED_PRECONDITION when another scheduler serves the folder, DATA_LOSS for a damaged database, UNAVAILABLE for an address
   /// that is taken.
   static absl::StatusOr<std::unique_ptr<SchedulerServer>> Start(const SchedulerOptions& options);
+  /// With a store that leads already.
+  static absl::StatusOr<std::unique_ptr<SchedulerServer>> Start(const SchedulerOptions& options, std::unique_ptr<store::Store> store);
   /// Ends all calls, works off what has come in, and makes it durable. Workers keep what they hold.
   ~SchedulerServer();
 

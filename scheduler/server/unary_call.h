@@ -13,11 +13,12 @@ namespace vorocast::server {
 /// Ends a call from the engine's thread: `work` fills `reply` within a turn, and the reply leaves once that turn is durable.
 template <typename Reply>
 void FinishInTurn(grpc::ServerUnaryReactor* reactor, Engine& engine, Reply* reply, std::function<absl::Status(Turn&, Reply&)> work) {
-  const bool accepted = engine.Submit([reactor, reply, work = std::move(work)](Turn& turn) {
+  const absl::Status accepted = engine.Ask([reactor, reply, work = std::move(work)](Turn& turn) {
     absl::Status status = work(turn, *reply);
-    turn.After([reactor, status = std::move(status)] { reactor->Finish(rpc::ToGrpc(status)); });
+    turn.Answer(
+        [reactor, status = std::move(status)](const absl::Status& durable) { reactor->Finish(rpc::ToGrpc(durable.ok() ? status : durable)); });
   });
-  if (!accepted) reactor->Finish(grpc::Status(grpc::StatusCode::UNAVAILABLE, "the scheduler is stopping or overloaded; try again"));
+  if (!accepted.ok()) reactor->Finish(rpc::ToGrpc(accepted));
 }
 
 template <typename Reply>

@@ -82,12 +82,17 @@ void Watchers::Send(Turn& turn, const std::string& id, Watched& watched) {
   const auto job = catalogue_.FindJob(id);
   if (!job.ok()) return;
   // The many outputs of single frames are listed once, at the end; until then they would be most of the message.
-  v1::Job message = JobMessage(turn.state(), catalogue_, **job, FrameOutputs::kLeftOut);
-  const bool last = HasEnded(message.state());
+  auto message = JobMessage(turn.state(), catalogue_, **job, FrameOutputs::kLeftOut);
+  const bool last = message.ok() && HasEnded(message->state());
   if (last) message = JobMessage(turn.state(), catalogue_, **job, FrameOutputs::kListed);
   watched.changed = false;
   watched.sent = MonotonicNow();
-  turn.After([calls = watched.calls, message = std::move(message), last] {
+  if (!message.ok()) {
+    return turn.After([calls = watched.calls, status = message.status()] {
+      for (const auto& call : calls) call->End(status);
+    });
+  }
+  turn.After([calls = watched.calls, message = *std::move(message), last] {
     for (const auto& call : calls) call->Push(message, last);
   });
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "scheduler/store/sqlite_connection.h"
 
+#include <cerrno>
 #include <cstring>
 
 #include <fmt/format.h>
@@ -34,7 +35,9 @@ absl::Status SqliteConnection::Error(std::string_view doing) const {
                     "no result in the artifact folder is computed again",
                     message));
   }
-  if (code == SQLITE_FULL) return absl::ResourceExhaustedError(message);
+  if (code == SQLITE_FULL || (code == SQLITE_IOERR && sqlite3_system_errno(get()) == ENOSPC)) {
+    return absl::ResourceExhaustedError(fmt::format("{}; free some space: work goes on by itself once there is room", message));
+  }
   return absl::UnavailableError(message);
 }
 
@@ -62,6 +65,10 @@ SqliteStatement& SqliteStatement::Bind(const base::Digest& value) {
   VOROCAST_CHECK(sqlite3_bind_blob64(statement_.get(), next_++, value.bytes.data(), value.bytes.size(), SQLITE_TRANSIENT) == SQLITE_OK);
   return *this;
 }
+SqliteStatement& SqliteStatement::BindBlob(const std::string& value) {
+  VOROCAST_CHECK(sqlite3_bind_blob64(statement_.get(), next_++, value.data(), value.size(), SQLITE_TRANSIENT) == SQLITE_OK);
+  return *this;
+}
 
 absl::Status SqliteStatement::Run() {
   const int result = sqlite3_step(statement_.get());
@@ -85,6 +92,11 @@ void SqliteStatement::Reset() {
 std::string SqliteStatement::Text(int column) const {
   const auto* text = reinterpret_cast<const char*>(sqlite3_column_text(statement_.get(), column));
   return text ? std::string(text, static_cast<std::size_t>(sqlite3_column_bytes(statement_.get(), column))) : std::string();
+}
+
+std::string SqliteStatement::Blob(int column) const {
+  const auto* bytes = static_cast<const char*>(sqlite3_column_blob(statement_.get(), column));
+  return bytes ? std::string(bytes, static_cast<std::size_t>(sqlite3_column_bytes(statement_.get(), column))) : std::string();
 }
 
 base::Digest SqliteStatement::Digest(int column) const {

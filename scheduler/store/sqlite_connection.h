@@ -23,6 +23,7 @@ class SqliteConnection {
   /// The last error as a status: DATA_LOSS for a damaged file, RESOURCE_EXHAUSTED for a full disk, else UNAVAILABLE; with the path.
   absl::Status Error(std::string_view doing) const;
   sqlite3* get() const { return database_.get(); }
+  const std::string& path() const { return path_; }
 
  private:
   struct Close {
@@ -42,6 +43,8 @@ class SqliteStatement {
   SqliteStatement& Bind(double value);
   SqliteStatement& Bind(const std::string& value);
   SqliteStatement& Bind(const base::Digest& value);
+  /// Bytes rather than text.
+  SqliteStatement& BindBlob(const std::string& value);
 
   /// To the end, then reset.
   absl::Status Run();
@@ -52,6 +55,7 @@ class SqliteStatement {
   std::int64_t Integer(int column) const { return sqlite3_column_int64(statement_.get(), column); }
   double Number(int column) const { return sqlite3_column_double(statement_.get(), column); }
   std::string Text(int column) const;
+  std::string Blob(int column) const;
   /// Zeros if the column does not hold 32 bytes.
   base::Digest Digest(int column) const;
 

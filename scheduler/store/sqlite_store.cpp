@@ -3,30 +3,18 @@
 
 #include <map>
 #include <mutex>
+#include <set>
 #include <unordered_map>
 
 #include <fmt/format.h>
 
 #include "scheduler/store/sqlite_connection.h"
+#include "scheduler/store/sqlite_schema.h"
+#include "scheduler/store/state_lock.h"
+#include "services/base/check.h"
 
 namespace vorocast::store {
 namespace {
-
-constexpr std::int64_t kSchemaVersion = 1;
-constexpr const char* kSchema = R"(
-CREATE TABLE meta(name TEXT PRIMARY KEY, value INTEGER NOT NULL) WITHOUT ROWID;
-CREATE TABLE sequence(position INTEGER PRIMARY KEY AUTOINCREMENT, id TEXT NOT NULL UNIQUE, session TEXT NOT NULL, name TEXT NOT NULL,
-  frames_per_second REAL NOT NULL, metres_per_unit REAL NOT NULL, up TEXT NOT NULL, closed INTEGER NOT NULL DEFAULT 0);
-CREATE TABLE frame(sequence TEXT NOT NULL, number INTEGER NOT NULL, blob BLOB NOT NULL, extension TEXT NOT NULL, size INTEGER NOT NULL,
-  PRIMARY KEY(sequence, number)) WITHOUT ROWID;
-CREATE TABLE job(position INTEGER PRIMARY KEY AUTOINCREMENT, id TEXT NOT NULL UNIQUE, sequence TEXT NOT NULL, user TEXT NOT NULL,
-  priority INTEGER NOT NULL, spec TEXT NOT NULL, cancelled INTEGER NOT NULL DEFAULT 0);
-CREATE TABLE failure(job TEXT NOT NULL, task TEXT NOT NULL, cause INTEGER NOT NULL, message TEXT NOT NULL, PRIMARY KEY(job, task)) WITHOUT ROWID;
-CREATE TABLE result(key BLOB PRIMARY KEY, sha256 BLOB NOT NULL, size INTEGER NOT NULL, seconds REAL NOT NULL, cpu_seconds REAL NOT NULL,
-  memory_peak INTEGER NOT NULL, made_for TEXT NOT NULL) WITHOUT ROWID;
-CREATE TABLE run(key BLOB PRIMARY KEY, attempt INTEGER NOT NULL, worker TEXT NOT NULL, failed INTEGER NOT NULL, interrupted INTEGER NOT NULL,
-  memory_raised INTEGER NOT NULL) WITHOUT ROWID;
-)";
 
 /// Writes one record; statements are prepared once.
 class RecordWriter {
@@ -45,6 +33,9 @@ class RecordWriter {
     return Write("INSERT OR IGNORE INTO job(id, sequence, user, priority, spec) VALUES(?,?,?,?,?)", r.id, r.sequence, r.user, r.priority,
                  r.spec_json);
   }
+  absl::Status operator()(const JobEnded& r) {
+    return Write("INSERT OR REPLACE INTO ended_job VALUES(?,?,?)", r.job, Bytes{r.summary}, Bytes{r.whole});
+  }
   absl::Status operator()(const core::Record& record) { return std::visit(*this, record); }
   absl::Status operator()(const core::ResultMade& r) {
     return Write("INSERT OR REPLACE INTO result VALUES(?,?,?,?,?,?,?)", r.key, r.result.sha256, r.result.size, r.result.seconds, r.result.cpu_seconds,
@@ -62,10 +53,21 @@ class RecordWriter {
   absl::Status operator()(const core::JobCancelled& r) { return Write("UPDATE job SET cancelled = 1 WHERE id = ?", r.job); }
   absl::Status operator()(const core::JobRetried& r) {
     RETURN_IF_ERROR(Write("UPDATE job SET cancelled = 0 WHERE id = ?", r.job));
+    RETURN_IF_ERROR(Write("DELETE FROM ended_job WHERE job = ?", r.job));
     return Write("DELETE FROM failure WHERE job = ?", r.job);
   }
 
  private:
+  /// Told apart from text.
+  struct Bytes {
+    const std::string& bytes;
+  };
+  template <typename Value>
+  static void Bind(SqliteStatement& statement, const Value& value) {
+    statement.Bind(value);
+  }
+  static void Bind(SqliteStatement& statement, const Bytes& value) { statement.BindBlob(value.bytes); }
+
   template <typename... Values>
   absl::Status Write(const char* sql, const Values&... values) {
     auto found = statements_.find(sql);
@@ -73,7 +75,7 @@ class RecordWriter {
       ASSIGN_OR_RETURN(SqliteStatement prepared, SqliteStatement::Prepare(connection_, sql));
       found = statements_.emplace(sql, std::move(prepared)).first;
     }
-    (found->second.Bind(values), ...);
+    (Bind(found->second, values), ...);
     return found->second.Run();
   }
 
@@ -81,160 +83,238 @@ class RecordWriter {
   std::unordered_map<const char*, SqliteStatement> statements_;  // by the literal's address
 };
 
+/// Calls `row` for each row of a query.
+template <typename Row>
+absl::Status ForEachRow(SqliteStatement& statement, const Row& row) {
+  while (true) {
+    ASSIGN_OR_RETURN(const bool more, statement.Next());
+    if (!more) return absl::OkStatus();
+    RETURN_IF_ERROR(row(statement));
+  }
+}
+template <typename Row>
+absl::Status ForEachRow(SqliteConnection& connection, std::string_view sql, const Row& row) {
+  ASSIGN_OR_RETURN(SqliteStatement statement, SqliteStatement::Prepare(connection, sql));
+  return ForEachRow(statement, row);
+}
+
+constexpr std::string_view kSequences =
+    "SELECT id, session, name, frames_per_second, metres_per_unit, up, closed, "
+    "(SELECT count(*) FROM frame WHERE sequence = id) FROM sequence ORDER BY position";
+/// Those of sequences that may still be planned.
+constexpr std::string_view kFramesInUse =
+    "SELECT sequence, number, blob, extension, size FROM frame WHERE sequence IN (SELECT id FROM sequence WHERE NOT closed UNION "
+    "SELECT sequence FROM job WHERE id NOT IN (SELECT job FROM ended_job)) ORDER BY sequence, number";
+constexpr std::string_view kFramesOfOne = "SELECT sequence, number, blob, extension, size FROM frame WHERE sequence = ? ORDER BY number";
+constexpr std::string_view kJobs =
+    "SELECT id, sequence, user, priority, spec, cancelled, id IN (SELECT job FROM ended_job) FROM job ORDER BY position";
+constexpr std::string_view kFailures =
+    "SELECT job, task, cause, message FROM failure WHERE job NOT IN (SELECT job FROM ended_job) ORDER BY job, task";
+constexpr std::string_view kRuns = "SELECT key, attempt, worker, failed, interrupted, memory_raised FROM run ORDER BY key";
+constexpr std::string_view kResult = "SELECT sha256, size, seconds, cpu_seconds, memory_peak, made_for FROM result WHERE key = ?";
+
+FrameAdded FrameOf(const SqliteStatement& row) {
+  return {.sequence = row.Text(0),
+          .number = static_cast<std::int32_t>(row.Integer(1)),
+          .blob = row.Digest(2),
+          .extension = row.Text(3),
+          .size = row.Integer(4)};
+}
+
 class SqliteStore final : public Store {
  public:
-  SqliteStore(SqliteConnection writing, SqliteConnection reading) : writing_(std::move(writing)), reading_(std::move(reading)) {}
+  SqliteStore(std::filesystem::path path, SqliteConnection writing, SqliteConnection reading)
+      : path_(std::move(path)), writing_(std::move(writing)), reading_(std::move(reading)) {}
+
+  absl::StatusOr<std::int64_t> Lead(const std::string&) override {
+    ASSIGN_OR_RETURN(lock_, StateLock::Take(path_.parent_path()));
+    RETURN_IF_ERROR(PrepareSqlite(writing_));
+    RETURN_IF_ERROR(InTransaction([this] { return writing_.Execute("UPDATE meta SET value = value + 1 WHERE name = 'term'"); }));
+    ASSIGN_OR_RETURN(term_, NewestTerm());
+    return term_;
+  }
+
+  /// Whoever is refused the lock is on the same machine and finds the address in the state folder.
+  std::string LeaderAddress() override { return {}; }
+
+  absl::Status KeepLeading() override {
+    const std::lock_guard lock(reading_mutex_);
+    std::int64_t newest = 0;
+    RETURN_IF_ERROR(ForEachRow(reading_, "SELECT value FROM meta WHERE name = 'term'", [&](const SqliteStatement& row) {
+      newest = row.Integer(0);
+      return absl::OkStatus();
+    }));
+    return CheckTerm(newest);
+  }
 
   absl::StatusOr<Snapshot> Load() override {
     Snapshot snapshot;
     RETURN_IF_ERROR(LoadSequences(snapshot));
     RETURN_IF_ERROR(LoadJobs(snapshot));
-    ASSIGN_OR_RETURN(SqliteStatement runs,
-                     SqliteStatement::Prepare(writing_, "SELECT key, attempt, worker, failed, interrupted, memory_raised FROM run ORDER BY key"));
-    while (true) {
-      ASSIGN_OR_RETURN(const bool more, runs.Next());
-      if (!more) break;
-      snapshot.runs.push_back({.key = runs.Digest(0),
-                               .attempt = runs.Integer(1),
-                               .worker = runs.Text(2),
-                               .tries = {.failed = static_cast<std::int32_t>(runs.Integer(3)),
-                                         .interrupted = static_cast<std::int32_t>(runs.Integer(4)),
-                                         .memory_raised = static_cast<std::int32_t>(runs.Integer(5))}});
-    }
-    ASSIGN_OR_RETURN(SqliteStatement meta, SqliteStatement::Prepare(writing_, "SELECT value FROM meta WHERE name = 'attempt_next'"));
-    ASSIGN_OR_RETURN(const bool reserved, meta.Next());
-    if (reserved) snapshot.attempt_next = meta.Integer(0);
+    RETURN_IF_ERROR(ForEachRow(writing_, kRuns, [&](const SqliteStatement& row) {
+      snapshot.runs.push_back({.key = row.Digest(0),
+                               .attempt = row.Integer(1),
+                               .worker = row.Text(2),
+                               .tries = {.failed = static_cast<std::int32_t>(row.Integer(3)),
+                                         .interrupted = static_cast<std::int32_t>(row.Integer(4)),
+                                         .memory_raised = static_cast<std::int32_t>(row.Integer(5))}});
+      return absl::OkStatus();
+    }));
+    RETURN_IF_ERROR(ForEachRow(writing_, "SELECT value FROM meta WHERE name = 'attempt_next'", [&](const SqliteStatement& row) {
+      snapshot.attempt_next = row.Integer(0);
+      return absl::OkStatus();
+    }));
     return snapshot;
   }
 
   absl::Status Append(const std::vector<Record>& records) override {
+    VOROCAST_CHECK(term_ > 0);
     if (records.empty()) return absl::OkStatus();
-    RETURN_IF_ERROR(writing_.Execute("BEGIN IMMEDIATE"));
-    absl::Status status;
-    for (const Record& record : records) {
-      status = std::visit(writer_, record);
-      if (!status.ok()) break;
-    }
-    if (status.ok()) status = writing_.Execute("COMMIT");
-    if (!status.ok() && sqlite3_get_autocommit(writing_.get()) == 0) (void)writing_.Execute("ROLLBACK");
-    return status;
+    return InTransaction([&]() -> absl::Status {
+      ASSIGN_OR_RETURN(const std::int64_t newest, NewestTerm());
+      RETURN_IF_ERROR(CheckTerm(newest));
+      for (const Record& record : records) RETURN_IF_ERROR(std::visit(writer_, record));
+      return absl::OkStatus();
+    });
   }
 
   absl::StatusOr<std::optional<core::Result>> FindResult(const base::Digest& key) override {
     const std::lock_guard lock(reading_mutex_);
     if (!find_result_) {
-      ASSIGN_OR_RETURN(
-          SqliteStatement prepared,
-          SqliteStatement::Prepare(reading_, "SELECT sha256, size, seconds, cpu_seconds, memory_peak, made_for FROM result WHERE key = ?"));
+      ASSIGN_OR_RETURN(SqliteStatement prepared, SqliteStatement::Prepare(reading_, kResult));
       find_result_.emplace(std::move(prepared));
     }
-    find_result_->Bind(key);
-    const absl::StatusOr<bool> found = find_result_->Next();
     std::optional<core::Result> result;
-    if (found.ok() && *found) {
-      result = core::Result{.sha256 = find_result_->Digest(0),
-                            .size = find_result_->Integer(1),
-                            .seconds = find_result_->Number(2),
-                            .cpu_seconds = find_result_->Number(3),
-                            .memory_peak = find_result_->Integer(4),
-                            .made_for = find_result_->Text(5)};
-    }
+    find_result_->Bind(key);
+    const absl::Status status = ForEachRow(*find_result_, [&](const SqliteStatement& row) {
+      result = core::Result{.sha256 = row.Digest(0),
+                            .size = row.Integer(1),
+                            .seconds = row.Number(2),
+                            .cpu_seconds = row.Number(3),
+                            .memory_peak = row.Integer(4),
+                            .made_for = row.Text(5)};
+      return absl::OkStatus();
+    });
     find_result_->Reset();
-    RETURN_IF_ERROR(found.status());
+    RETURN_IF_ERROR(status);
     return result;
   }
 
+  absl::StatusOr<std::string> FindJobText(const std::string& job, JobText which) override {
+    const std::lock_guard lock(reading_mutex_);
+    ASSIGN_OR_RETURN(SqliteStatement statement, SqliteStatement::Prepare(reading_, fmt::format("SELECT {} FROM ended_job WHERE job = ?",
+                                                                                               which == JobText::kSummary ? "summary" : "whole")));
+    statement.Bind(job);
+    ASSIGN_OR_RETURN(const bool found, statement.Next());
+    if (!found) return absl::NotFoundError(fmt::format("{}: job {} has not ended", path_.string(), job));
+    return statement.Blob(0);
+  }
+
+  absl::StatusOr<std::vector<FrameAdded>> LoadFrames(const std::string& sequence) override {
+    const std::lock_guard lock(reading_mutex_);
+    ASSIGN_OR_RETURN(SqliteStatement statement, SqliteStatement::Prepare(reading_, kFramesOfOne));
+    statement.Bind(sequence);
+    std::vector<FrameAdded> frames;
+    RETURN_IF_ERROR(ForEachRow(statement, [&](const SqliteStatement& row) {
+      frames.push_back(FrameOf(row));
+      return absl::OkStatus();
+    }));
+    return frames;
+  }
+
  private:
+  template <typename Work>
+  absl::Status InTransaction(const Work& work) {
+    RETURN_IF_ERROR(writing_.Execute("BEGIN IMMEDIATE"));
+    absl::Status status = work();
+    if (status.ok()) status = writing_.Execute("COMMIT");
+    if (!status.ok() && sqlite3_get_autocommit(writing_.get()) == 0) (void)writing_.Execute("ROLLBACK");
+    return status;
+  }
+
+  absl::StatusOr<std::int64_t> NewestTerm() {
+    if (!newest_term_) {
+      ASSIGN_OR_RETURN(SqliteStatement prepared, SqliteStatement::Prepare(writing_, "SELECT value FROM meta WHERE name = 'term'"));
+      newest_term_.emplace(std::move(prepared));
+    }
+    const absl::StatusOr<bool> found = newest_term_->Next();
+    const std::int64_t term = found.ok() && *found ? newest_term_->Integer(0) : 0;
+    newest_term_->Reset();
+    RETURN_IF_ERROR(found.status());
+    return term;
+  }
+
+  absl::Status CheckTerm(std::int64_t newest) const {
+    if (newest == term_) return absl::OkStatus();
+    return absl::FailedPreconditionError(fmt::format(
+        "{}: another scheduler leads under term {}; this one's was {}, and nothing more of it is written", path_.string(), newest, term_));
+  }
+
   absl::Status LoadSequences(Snapshot& snapshot) {
     std::map<std::string, std::size_t> by_id;
-    ASSIGN_OR_RETURN(SqliteStatement sequences,
-                     SqliteStatement::Prepare(
-                         writing_, "SELECT id, session, name, frames_per_second, metres_per_unit, up, closed FROM sequence ORDER BY position"));
-    while (true) {
-      ASSIGN_OR_RETURN(const bool more, sequences.Next());
-      if (!more) break;
-      by_id.emplace(sequences.Text(0), snapshot.sequences.size());
-      snapshot.sequences.push_back({.opened = {.id = sequences.Text(0),
-                                               .session = sequences.Text(1),
-                                               .name = sequences.Text(2),
-                                               .frames_per_second = sequences.Number(3),
-                                               .metres_per_unit = sequences.Number(4),
-                                               .up = sequences.Text(5)},
-                                    .closed = sequences.Integer(6) != 0});
-    }
-    ASSIGN_OR_RETURN(SqliteStatement frames,
-                     SqliteStatement::Prepare(writing_, "SELECT sequence, number, blob, extension, size FROM frame ORDER BY sequence, number"));
-    while (true) {
-      ASSIGN_OR_RETURN(const bool more, frames.Next());
-      if (!more) break;
-      const auto sequence = by_id.find(frames.Text(0));
-      if (sequence == by_id.end()) return absl::DataLossError(fmt::format("a frame belongs to sequence {}, which is not on record", frames.Text(0)));
-      snapshot.sequences[sequence->second].frames.push_back({.sequence = frames.Text(0),
-                                                             .number = static_cast<std::int32_t>(frames.Integer(1)),
-                                                             .blob = frames.Digest(2),
-                                                             .extension = frames.Text(3),
-                                                             .size = frames.Integer(4)});
-    }
-    return absl::OkStatus();
+    RETURN_IF_ERROR(ForEachRow(writing_, kSequences, [&](const SqliteStatement& row) {
+      by_id.emplace(row.Text(0), snapshot.sequences.size());
+      StoredSequence& sequence = snapshot.sequences.emplace_back();
+      sequence.opened = {.id = row.Text(0),
+                         .session = row.Text(1),
+                         .name = row.Text(2),
+                         .frames_per_second = row.Number(3),
+                         .metres_per_unit = row.Number(4),
+                         .up = row.Text(5)};
+      sequence.closed = row.Integer(6) != 0;
+      sequence.frame_count = row.Integer(7);
+      if (!sequence.closed || sequence.frame_count == 0) sequence.frames.emplace();
+      return absl::OkStatus();
+    }));
+    return ForEachRow(writing_, kFramesInUse, [&](const SqliteStatement& row) -> absl::Status {
+      const auto found = by_id.find(row.Text(0));
+      if (found == by_id.end()) return absl::DataLossError(fmt::format("a frame belongs to sequence {}, which is not on record", row.Text(0)));
+      StoredSequence& sequence = snapshot.sequences[found->second];
+      if (!sequence.frames) sequence.frames.emplace();
+      sequence.frames->push_back(FrameOf(row));
+      return absl::OkStatus();
+    });
   }
 
   absl::Status LoadJobs(Snapshot& snapshot) {
     std::map<std::string, std::size_t> by_id;
-    ASSIGN_OR_RETURN(SqliteStatement jobs,
-                     SqliteStatement::Prepare(writing_, "SELECT id, sequence, user, priority, spec, cancelled FROM job ORDER BY position"));
-    while (true) {
-      ASSIGN_OR_RETURN(const bool more, jobs.Next());
-      if (!more) break;
-      by_id.emplace(jobs.Text(0), snapshot.jobs.size());
-      snapshot.jobs.push_back({.added = {.id = jobs.Text(0),
-                                         .sequence = jobs.Text(1),
-                                         .user = jobs.Text(2),
-                                         .priority = static_cast<std::int32_t>(jobs.Integer(3)),
-                                         .spec_json = jobs.Text(4)},
-                               .cancelled = jobs.Integer(5) != 0});
-    }
-    ASSIGN_OR_RETURN(SqliteStatement failures,
-                     SqliteStatement::Prepare(writing_, "SELECT job, task, cause, message FROM failure ORDER BY job, task"));
-    while (true) {
-      ASSIGN_OR_RETURN(const bool more, failures.Next());
-      if (!more) break;
-      const auto job = by_id.find(failures.Text(0));
-      if (job == by_id.end()) return absl::DataLossError(fmt::format("a failure belongs to job {}, which is not on record", failures.Text(0)));
+    RETURN_IF_ERROR(ForEachRow(writing_, kJobs, [&](const SqliteStatement& row) {
+      by_id.emplace(row.Text(0), snapshot.jobs.size());
+      snapshot.jobs.push_back({.added = {.id = row.Text(0),
+                                         .sequence = row.Text(1),
+                                         .user = row.Text(2),
+                                         .priority = static_cast<std::int32_t>(row.Integer(3)),
+                                         .spec_json = row.Text(4)},
+                               .cancelled = row.Integer(5) != 0,
+                               .ended = row.Integer(6) != 0});
+      return absl::OkStatus();
+    }));
+    return ForEachRow(writing_, kFailures, [&](const SqliteStatement& row) -> absl::Status {
+      const auto job = by_id.find(row.Text(0));
+      if (job == by_id.end()) return absl::DataLossError(fmt::format("a failure belongs to job {}, which is not on record", row.Text(0)));
       snapshot.jobs[job->second].failures.push_back(
-          {.job = failures.Text(0), .task = failures.Text(1), .cause = static_cast<core::Cause>(failures.Integer(2)), .message = failures.Text(3)});
-    }
-    return absl::OkStatus();
+          {.job = row.Text(0), .task = row.Text(1), .cause = static_cast<core::Cause>(row.Integer(2)), .message = row.Text(3)});
+      return absl::OkStatus();
+    });
   }
 
+  const std::filesystem::path path_;
+  std::optional<StateLock> lock_;
+  std::int64_t term_ = 0;
   SqliteConnection writing_;
   RecordWriter writer_{writing_};
+  std::optional<SqliteStatement> newest_term_;
   std::mutex reading_mutex_;
   SqliteConnection reading_;                    // guarded by reading_mutex_
   std::optional<SqliteStatement> find_result_;  // guarded by reading_mutex_
 };
 
-absl::Status PrepareSchema(SqliteConnection& connection, const std::filesystem::path& path) {
-  RETURN_IF_ERROR(connection.Execute("PRAGMA journal_mode = WAL"));
-  RETURN_IF_ERROR(connection.Execute("PRAGMA synchronous = FULL"));
-  ASSIGN_OR_RETURN(SqliteStatement version, SqliteStatement::Prepare(connection, "PRAGMA user_version"));
-  RETURN_IF_ERROR(version.Next().status());
-  const std::int64_t found = version.Integer(0);
-  version.Reset();
-  if (found > kSchemaVersion) {
-    return absl::FailedPreconditionError(
-        fmt::format("{}: written by a newer version (schema {}, this program knows {}); use that version", path.string(), found, kSchemaVersion));
-  }
-  if (found == kSchemaVersion) return absl::OkStatus();
-  return connection.Execute(fmt::format("BEGIN EXCLUSIVE;{} PRAGMA user_version = {}; COMMIT", kSchema, kSchemaVersion));
-}
-
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<Store>> OpenSqliteStore(const std::filesystem::path& path) {
   ASSIGN_OR_RETURN(SqliteConnection writing, SqliteConnection::Open(path));
-  RETURN_IF_ERROR(PrepareSchema(writing, path));
   ASSIGN_OR_RETURN(SqliteConnection reading, SqliteConnection::Open(path));
-  return std::make_unique<SqliteStore>(std::move(writing), std::move(reading));
+  return std::make_unique<SqliteStore>(path, std::move(writing), std::move(reading));
 }
 
 }  // namespace vorocast::store

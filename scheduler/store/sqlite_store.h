@@ -9,7 +9,8 @@
 namespace vorocast::store {
 
 /// One SQLite database in WAL mode with full synchronisation: a batch is one transaction and costs one fsync.
-/// Errors: DATA_LOSS for a damaged file, FAILED_PRECONDITION for one that a newer version has written.
+/// Only one process can lead: it holds a lock in the database's folder, which the kernel frees when that process ends, however it ends.
+/// UNAVAILABLE when the file cannot be opened; everything else shows when it leads.
 absl::StatusOr<std::unique_ptr<Store>> OpenSqliteStore(const std::filesystem::path& path);
 
 }  // namespace vorocast::store

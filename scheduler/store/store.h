@@ -40,19 +40,29 @@ struct JobAdded {
   std::string spec_json;  // plan::JobSpec
 };
 
-using Record = std::variant<SequenceOpened, FrameAdded, SequenceClosed, JobAdded, core::Record>;
+/// A job that has come to its end, as it is shown from then on without being planned again. core::JobRetried forgets it.
+struct JobEnded {
+  std::string job;
+  std::string summary;  // v1::Job without the frames' own outputs
+  std::string whole;    // v1::Job with all of them
+};
+
+using Record = std::variant<SequenceOpened, FrameAdded, SequenceClosed, JobAdded, JobEnded, core::Record>;
 
 struct StoredSequence {
   SequenceOpened opened;
   bool closed = false;
-  std::vector<FrameAdded> frames;  // by number
+  std::int64_t frame_count = 0;
+  /// By number. Left out for a closed sequence whose jobs have all ended: LoadFrames brings them.
+  std::optional<std::vector<FrameAdded>> frames;
 };
 struct StoredJob {
   JobAdded added;
   bool cancelled = false;
-  std::vector<core::TaskFailed> failures;  // by task name
+  bool ended = false;
+  std::vector<core::TaskFailed> failures;  // by task name; none for an ended job
 };
-/// Everything but the results, which are looked up by key.
+/// What a scheduler needs to go on: everything but results and ended jobs, which are looked up when somebody asks.
 struct Snapshot {
   std::vector<StoredSequence> sequences;  // in the order they were opened
   std::vector<StoredJob> jobs;            // in the order they were added
@@ -60,15 +70,35 @@ struct Snapshot {
   std::int64_t attempt_next = 1;
 };
 
+enum class JobText { kSummary, kWhole };
+
+/// One scheduler at a time writes. It leads under a term, a number larger than that of every leader before it, and every batch is written only
+/// while that term is the newest: a leader that was stopped for a while, and replaced meanwhile, cannot overwrite what its successor did.
 class Store {
  public:
   virtual ~Store() = default;
+
+  /// Becomes the one that writes, and brings the schema up to date. Returns the term. To be called before everything else.
+  /// Errors: FAILED_PRECONDITION names who leads now, or says that a newer version wrote this store; DATA_LOSS for a damaged one;
+  /// UNAVAILABLE when it cannot be reached, RESOURCE_EXHAUSTED when its disk is full.
+  virtual absl::StatusOr<std::int64_t> Lead(const std::string& address) = 0;
+  /// Where the present leader can be reached, as it said itself; empty if nobody knows.
+  virtual std::string LeaderAddress() = 0;
+  /// A leader's sign of life, about once a second, from one thread. FAILED_PRECONDITION: another leads now. UNAVAILABLE: not known.
+  virtual absl::Status KeepLeading() = 0;
+
   virtual absl::StatusOr<Snapshot> Load() = 0;
   /// All of the records or none, in this order, durable on return. Writing a record twice is harmless, so a batch whose outcome is
-  /// not known may be written again.
+  /// not known may be written again. FAILED_PRECONDITION: another leads now, and nothing was written.
   virtual absl::Status Append(const std::vector<Record>& records) = 0;
-  /// Safe to call from other threads.
+
+  // Safe to call from other threads.
+
   virtual absl::StatusOr<std::optional<core::Result>> FindResult(const base::Digest& key) = 0;
+  /// Of an ended job; NOT_FOUND for another.
+  virtual absl::StatusOr<std::string> FindJobText(const std::string& job, JobText which) = 0;
+  /// By number.
+  virtual absl::StatusOr<std::vector<FrameAdded>> LoadFrames(const std::string& sequence) = 0;
 };
 
 }  // namespace vorocast::store

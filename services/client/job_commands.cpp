@@ -24,7 +24,7 @@ struct SchedulerFlags {
   std::string to, state;
 
   void AddTo(CLI::App& command) {
-    command.add_option("--to", to, "Scheduler's address, HOST:PORT (VOROCAST_SCHEDULER, or the one serving --state here)")
+    command.add_option("--to", to, "Scheduler's address, HOST:PORT; A,B where one stands by (VOROCAST_SCHEDULER, or the one serving --state here)")
         ->envname("VOROCAST_SCHEDULER");
     command.add_option("--state", state, "State folder of a scheduler on this machine (~/.cache/vorocast)");
   }

@@ -22,6 +22,7 @@ namespace {
 /// So many times in a row the scheduler may be unreachable before the client gives up.
 constexpr int kReconnectsMax = 20;
 constexpr std::int32_t kAbandonedJobsMax = 200;
+constexpr auto kFullDiskPause = std::chrono::seconds(1);
 constexpr auto kReconnectPause = std::chrono::milliseconds(250);
 
 /// Runs share one state folder, and the same folder of frames may be run with other flags or in part; each gets a sequence of its own.
@@ -53,6 +54,7 @@ absl::Status CancelAbandonedJobs(SchedulerClient& client) {
 absl::StatusOr<v1::Job> FollowJob(EmbeddedService& service, std::unique_ptr<SchedulerClient>& client, const v1::SubmitJobRequest& request) {
   JobView view;
   std::string job_id;
+  std::string said;
   int reconnects = 0;
   while (true) {
     absl::StatusOr<v1::Job> job = job_id.empty() ? client->Submit(request) : client->Get(job_id);
@@ -73,6 +75,13 @@ absl::StatusOr<v1::Job> FollowJob(EmbeddedService& service, std::unique_ptr<Sche
     if (job.ok() && HasEnded(*job)) {
       view.Finish(*job);
       return job;
+    }
+    if (absl::IsResourceExhausted(job.status())) {
+      // Its disk is full: it goes on by itself once there is room, and so does this.
+      if (std::string why(job.status().message()); why != said) view.Say(said = std::move(why));
+      reconnects = 0;
+      std::this_thread::sleep_for(kFullDiskPause);
+      continue;
     }
     if (!job.ok() && !absl::IsUnavailable(job.status()) && !absl::IsDeadlineExceeded(job.status())) return job.status();
     if (++reconnects > kReconnectsMax) return job.ok() ? absl::UnavailableError("the scheduler ended the stream again and again") : job.status();

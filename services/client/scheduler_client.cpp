@@ -7,6 +7,7 @@
 #include <set>
 #include <stop_token>
 #include <thread>
+#include <utility>
 
 #include <fmt/format.h>
 #include <grpcpp/grpcpp.h>
@@ -19,20 +20,13 @@ namespace vorocast::client {
 namespace {
 
 constexpr auto kCallDeadline = std::chrono::seconds(60);
+constexpr auto kCallDeadlineOfSeveral = std::chrono::seconds(20);
+/// So long no scheduler of several may lead before a call gives up.
+constexpr auto kTakeoverTime = std::chrono::seconds(60);
 constexpr auto kUploadDeadline = std::chrono::minutes(30);  // of one frame, over a slow network
 constexpr auto kInterruptInterval = std::chrono::milliseconds(100);
 constexpr std::size_t kChunkBytes = 1 << 20;
 constexpr std::size_t kFramesPerCall = 1000;
-
-/// One unary call with a deadline; the gRPC status becomes an absl one.
-template <typename Stub, typename Request, typename Reply>
-absl::StatusOr<Reply> Call(Stub& stub, grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Reply*), const Request& request) {
-  grpc::ClientContext context;
-  context.set_deadline(std::chrono::system_clock::now() + kCallDeadline);
-  Reply reply;
-  RETURN_IF_ERROR(rpc::FromGrpc((stub.*method)(&context, request, &reply)));
-  return reply;
-}
 
 std::string LowerCaseExtension(const std::filesystem::path& path) {
   std::string extension = path.extension().string();
@@ -40,12 +34,62 @@ std::string LowerCaseExtension(const std::filesystem::path& path) {
   return extension;
 }
 
+/// Sends one blob's bytes.
+absl::Status UploadOnce(v1::Captures::Stub& captures, const v1::Blob& blob, const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file) return absl::NotFoundError(fmt::format("{}: cannot be opened", path.string()));
+  grpc::ClientContext context;
+  context.set_deadline(std::chrono::system_clock::now() + kUploadDeadline);
+  v1::UploadReply reply;
+  const auto writer = captures.Upload(&context, &reply);
+  v1::UploadChunk chunk;
+  *chunk.mutable_blob() = blob;
+  bool open = writer->Write(chunk);
+  chunk.clear_blob();
+  std::string block(kChunkBytes, '\0');
+  while (open && file) {
+    file.read(block.data(), static_cast<std::streamsize>(block.size()));
+    if (file.gcount() == 0) break;
+    chunk.set_data(block.data(), static_cast<std::size_t>(file.gcount()));
+    open = writer->Write(chunk);
+  }
+  writer->WritesDone();
+  return base::Annotate(rpc::FromGrpc(writer->Finish()), path.string());
+}
+
 }  // namespace
 
 SchedulerClient::SchedulerClient(const std::string& address) : address_(address) {
-  const auto channel = rpc::Connect(address);
-  captures_ = v1::Captures::NewStub(channel);
-  jobs_ = v1::Jobs::NewStub(channel);
+  for (const std::string& each : rpc::SplitAddresses(address)) {
+    const auto channel = rpc::Connect(each);
+    schedulers_.push_back({v1::Captures::NewStub(channel), v1::Jobs::NewStub(channel)});
+  }
+}
+
+absl::Status SchedulerClient::WithLeader(const std::function<absl::Status(const Scheduler&)>& call, const std::function<bool()>& interrupted) {
+  const auto give_up = std::chrono::steady_clock::now() + kTakeoverTime;
+  while (true) {
+    const absl::Status status = call(schedulers_[in_use_]);
+    if (schedulers_.size() == 1 || !(absl::IsUnavailable(status) || absl::IsDeadlineExceeded(status))) return status;
+    if (interrupted() || std::chrono::steady_clock::now() > give_up) return status;
+    in_use_ = (in_use_ + 1) % schedulers_.size();
+    std::this_thread::sleep_for(kInterruptInterval);
+  }
+}
+
+/// One unary call with a deadline; the gRPC status becomes an absl one.
+template <typename Service, typename Request, typename Reply>
+absl::StatusOr<Reply> SchedulerClient::Call(std::unique_ptr<Service> Scheduler::*service,
+                                            grpc::Status (Service::*method)(grpc::ClientContext*, const Request&, Reply*), const Request& request) {
+  Reply reply;
+  // One that was stopped keeps its connections and answers nothing; where there is another, that is found out sooner.
+  const auto deadline = schedulers_.size() == 1 ? kCallDeadline : kCallDeadlineOfSeveral;
+  RETURN_IF_ERROR(WithLeader([&](const Scheduler& scheduler) {
+    grpc::ClientContext context;
+    context.set_deadline(std::chrono::system_clock::now() + deadline);
+    return rpc::FromGrpc(((*(scheduler.*service)).*method)(&context, request, &reply));
+  }));
+  return reply;
 }
 
 absl::StatusOr<v1::Sequence> SchedulerClient::Upload(const capture::Capture& capture, const std::string& session, const base::Progress& progress,
@@ -69,7 +113,7 @@ absl::StatusOr<v1::Sequence> SchedulerClient::Upload(const capture::Capture& cap
   open.set_frames_per_second(capture.frames_per_second);
   open.set_metres_per_unit(capture.metres_per_unit);
   open.set_up(capture.up);
-  ASSIGN_OR_RETURN(v1::Sequence sequence, Call(*captures_, &v1::Captures::Stub::Open, open));
+  ASSIGN_OR_RETURN(v1::Sequence sequence, Call(&Scheduler::captures, &v1::Captures::Stub::Open, open));
 
   for (std::size_t first = 0; first < blobs.size(); first += kFramesPerCall) {
     const std::size_t last = std::min(blobs.size(), first + kFramesPerCall);
@@ -82,7 +126,7 @@ absl::StatusOr<v1::Sequence> SchedulerClient::Upload(const capture::Capture& cap
       frame.set_number(capture.frames[i].number);
       *frame.mutable_blob() = blobs[i];
     }
-    ASSIGN_OR_RETURN(const v1::MissingReply missing, Call(*captures_, &v1::Captures::Stub::Missing, ask));
+    ASSIGN_OR_RETURN(const v1::MissingReply missing, Call(&Scheduler::captures, &v1::Captures::Stub::Missing, ask));
     std::set<std::string> wanted;
     for (const v1::Blob& blob : missing.blobs()) wanted.insert(blob.sha256() + blob.extension());
     for (std::size_t i = first; i < last; ++i) {
@@ -90,68 +134,50 @@ absl::StatusOr<v1::Sequence> SchedulerClient::Upload(const capture::Capture& cap
       if (wanted.erase(blobs[i].sha256() + blobs[i].extension()) > 0) RETURN_IF_ERROR(UploadBlob(blobs[i], capture.frames[i].path));
       base::Report(progress, 0.3 + 0.7 * static_cast<double>(i + 1) / static_cast<double>(blobs.size()));
     }
-    ASSIGN_OR_RETURN(sequence, Call(*captures_, &v1::Captures::Stub::Add, add));
+    ASSIGN_OR_RETURN(sequence, Call(&Scheduler::captures, &v1::Captures::Stub::Add, add));
   }
 
   v1::CloseSequenceRequest close;
   close.set_sequence_id(sequence.id());
-  return Call(*captures_, &v1::Captures::Stub::Close, close);
+  return Call(&Scheduler::captures, &v1::Captures::Stub::Close, close);
 }
 
 absl::Status SchedulerClient::UploadBlob(const v1::Blob& blob, const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) return absl::NotFoundError(fmt::format("{}: cannot be opened", path.string()));
-  grpc::ClientContext context;
-  context.set_deadline(std::chrono::system_clock::now() + kUploadDeadline);
-  v1::UploadReply reply;
-  const auto writer = captures_->Upload(&context, &reply);
-  v1::UploadChunk chunk;
-  *chunk.mutable_blob() = blob;
-  bool open = writer->Write(chunk);
-  chunk.clear_blob();
-  std::string block(kChunkBytes, '\0');
-  while (open && file) {
-    file.read(block.data(), static_cast<std::streamsize>(block.size()));
-    if (file.gcount() == 0) break;
-    chunk.set_data(block.data(), static_cast<std::size_t>(file.gcount()));
-    open = writer->Write(chunk);
-  }
-  writer->WritesDone();
-  return base::Annotate(rpc::FromGrpc(writer->Finish()), path.string());
+  return WithLeader([&](const Scheduler& scheduler) { return UploadOnce(*scheduler.captures, blob, path); });
 }
 
-absl::StatusOr<v1::Job> SchedulerClient::Submit(const v1::SubmitJobRequest& request) { return Call(*jobs_, &v1::Jobs::Stub::Submit, request); }
+absl::StatusOr<v1::Job> SchedulerClient::Submit(const v1::SubmitJobRequest& request) { return Call(&Scheduler::jobs, &v1::Jobs::Stub::Submit, request); }
 
 absl::StatusOr<v1::Job> SchedulerClient::Get(const std::string& job_id) {
   v1::JobRequest request;
   request.set_job_id(job_id);
-  return Call(*jobs_, &v1::Jobs::Stub::Get, request);
+  return Call(&Scheduler::jobs, &v1::Jobs::Stub::Get, request);
 }
 
 absl::StatusOr<std::vector<v1::Job>> SchedulerClient::List(std::int32_t limit) {
   v1::ListJobsRequest request;
   request.set_limit(limit);
-  ASSIGN_OR_RETURN(const v1::ListJobsReply reply, Call(*jobs_, &v1::Jobs::Stub::List, request));
+  ASSIGN_OR_RETURN(const v1::ListJobsReply reply, Call(&Scheduler::jobs, &v1::Jobs::Stub::List, request));
   return std::vector<v1::Job>(reply.jobs().begin(), reply.jobs().end());
 }
 
 absl::StatusOr<v1::Job> SchedulerClient::Cancel(const std::string& job_id) {
   v1::JobRequest request;
   request.set_job_id(job_id);
-  return Call(*jobs_, &v1::Jobs::Stub::Cancel, request);
+  return Call(&Scheduler::jobs, &v1::Jobs::Stub::Cancel, request);
 }
 
 absl::StatusOr<v1::Job> SchedulerClient::Retry(const std::string& job_id) {
   v1::JobRequest request;
   request.set_job_id(job_id);
-  return Call(*jobs_, &v1::Jobs::Stub::Retry, request);
+  return Call(&Scheduler::jobs, &v1::Jobs::Stub::Retry, request);
 }
 
 absl::StatusOr<std::string> SchedulerClient::Explain(const std::string& job_id, const std::string& task) {
   v1::ExplainRequest request;
   request.set_job_id(job_id);
   request.set_task(task);
-  ASSIGN_OR_RETURN(const v1::ExplainReply reply, Call(*jobs_, &v1::Jobs::Stub::Explain, request));
+  ASSIGN_OR_RETURN(const v1::ExplainReply reply, Call(&Scheduler::jobs, &v1::Jobs::Stub::Explain, request));
   return reply.text();
 }
 
@@ -159,22 +185,40 @@ absl::StatusOr<v1::Job> SchedulerClient::Watch(const std::string& job_id, const 
                                                const std::function<bool()>& interrupted) {
   v1::JobRequest request;
   request.set_job_id(job_id);
-  grpc::ClientContext context;
-  const auto reader = jobs_->Watch(&context, request);
-  // Read blocks until the job changes, so another thread looks for the interruption.
-  const std::jthread interrupter([&](const std::stop_token& stop) {
-    while (!stop.stop_requested()) {
-      if (interrupted()) context.TryCancel();
-      std::this_thread::sleep_for(kInterruptInterval);
-    }
-  });
   v1::Job job;
-  while (reader->Read(&job)) seen(job);
-  RETURN_IF_ERROR(rpc::FromGrpc(reader->Finish()));
+  absl::Status status;
+  bool heard = true;
+  // Each scheduler that leads for a while begins the time anew.
+  while (std::exchange(heard, false)) {
+    status = WithLeader(
+        [&](const Scheduler& scheduler) {
+          grpc::ClientContext context;
+          const auto reader = scheduler.jobs->Watch(&context, request);
+          // Read blocks until the job changes, so another thread looks for the interruption.
+          const std::jthread interrupter([&](const std::stop_token& stop) {
+            while (!stop.stop_requested()) {
+              if (interrupted()) context.TryCancel();
+              std::this_thread::sleep_for(kInterruptInterval);
+            }
+          });
+          while (reader->Read(&job)) {
+            heard = true;
+            seen(job);
+          }
+          return rpc::FromGrpc(reader->Finish());
+        },
+        interrupted);
+    if (status.ok() || schedulers_.size() == 1 || interrupted()) break;
+  }
+  RETURN_IF_ERROR(status);
   return job;
 }
 
 absl::Status SchedulerClient::Fetch(const std::string& job_id, const v1::Output& output, const std::filesystem::path& path) {
+  return WithLeader([&](const Scheduler&) { return FetchOnce(job_id, output, path); });
+}
+
+absl::Status SchedulerClient::FetchOnce(const std::string& job_id, const v1::Output& output, const std::filesystem::path& path) {
   ASSIGN_OR_RETURN(const base::Digest expected, base::Digest::FromHex(output.sha256()));
   std::error_code error;
   if (std::filesystem::file_size(path, error) == static_cast<std::uintmax_t>(output.size()) && !error) {
@@ -189,7 +233,7 @@ absl::Status SchedulerClient::Fetch(const std::string& job_id, const v1::Output&
   request.set_job_id(job_id);
   request.set_name(output.name());
   grpc::ClientContext context;
-  const auto reader = jobs_->Fetch(&context, request);
+  const auto reader = schedulers_[in_use_].jobs->Fetch(&context, request);
   base::Hasher hasher;
   v1::FetchChunk chunk;
   while (file && reader->Read(&chunk)) {

@@ -18,6 +18,8 @@ namespace vorocast::client {
 /// What a client asks of a scheduler, as plain calls. Every call has a deadline, except those that stream until the job has ended.
 class SchedulerClient {
  public:
+  /// Several addresses, separated by commas, are the schedulers of one farm, of which one leads: when that dies, calls are tried again until
+  /// another has taken over.
   explicit SchedulerClient(const std::string& address);
 
   const std::string& address() const { return address_; }
@@ -42,11 +44,21 @@ class SchedulerClient {
   absl::Status Fetch(const std::string& job_id, const v1::Output& output, const std::filesystem::path& path);
 
  private:
+  struct Scheduler {
+    std::unique_ptr<v1::Captures::Stub> captures;
+    std::unique_ptr<v1::Jobs::Stub> jobs;
+  };
   absl::Status UploadBlob(const v1::Blob& blob, const std::filesystem::path& path);
+  absl::Status FetchOnce(const std::string& job_id, const v1::Output& output, const std::filesystem::path& path);
+  /// Calls `call` with the scheduler in use, and while that is UNAVAILABLE with the next one, for a while.
+  absl::Status WithLeader(const std::function<absl::Status(const Scheduler&)>& call, const std::function<bool()>& interrupted = [] { return false; });
+  template <typename Service, typename Request, typename Reply>
+  absl::StatusOr<Reply> Call(std::unique_ptr<Service> Scheduler::*service, grpc::Status (Service::*method)(grpc::ClientContext*, const Request&, Reply*),
+                             const Request& request);
 
   std::string address_;
-  std::unique_ptr<v1::Captures::Stub> captures_;
-  std::unique_ptr<v1::Jobs::Stub> jobs_;
+  std::vector<Scheduler> schedulers_;
+  std::size_t in_use_ = 0;
 };
 
 }  // namespace vorocast::client

@@ -13,7 +13,7 @@ namespace {
 
 void AddServe(CLI::App& program, int& exit_code) {
   struct Flags {
-    std::string state, listen = "127.0.0.1:7400";
+    std::string state, database, listen = "127.0.0.1:7400";
     std::int32_t workers = 0;
   };
   auto flags = std::make_shared<Flags>();
@@ -21,11 +21,14 @@ void AddServe(CLI::App& program, int& exit_code) {
   command.add_option("--state", flags->state, "Folder for state and results (~/.cache/vorocast)");
   command.add_option("--listen", flags->listen, "Address: HOST:PORT or unix:/PATH. There is no authentication yet: keep it to a trusted network")
       ->capture_default_str();
+  command.add_option("--database", flags->database,
+                     "postgresql://USER@HOST/NAME instead of SQLite in the state folder; a second scheduler on the same database stands by");
   command.add_option("--workers", flags->workers, "Workers to start on this machine beside it, with one simulation; 0: none")
       ->capture_default_str()
       ->check(CLI::Range(0, 1024));
   command.callback([flags, &exit_code] {
     std::vector<std::string> arguments = {"--state", flags->state.empty() ? DefaultStateFolder().string() : flags->state, "--listen", flags->listen};
+    if (!flags->database.empty()) arguments.insert(arguments.end(), {"--database", flags->database});
     if (flags->workers > 0) arguments.insert(arguments.end(), {"--workers", std::to_string(flags->workers), "--simulation"});
     exit_code = PrintError(BecomeProgram("vorocast-scheduler", arguments));
   });
@@ -38,7 +41,7 @@ void AddWorker(CLI::App& program, int& exit_code) {
   };
   auto flags = std::make_shared<Flags>();
   CLI::App& command = *program.add_subcommand("worker", "Take tasks from a scheduler until stopped");
-  command.add_option("--scheduler", flags->scheduler, "Its address, HOST:PORT")->required();
+  command.add_option("--scheduler", flags->scheduler, "Its address, HOST:PORT; A,B where one stands by")->required();
   command.add_option("--slots", flags->slots, "Tasks at once")->capture_default_str()->check(CLI::Range(1, 1024));
   command.callback([flags, &exit_code] {
     exit_code = PrintError(BecomeProgram("vorocast-worker", {"--scheduler", flags->scheduler, "--slots", std::to_string(flags->slots)}));

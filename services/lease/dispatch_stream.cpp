@@ -5,8 +5,8 @@
 
 namespace vorocast::lease {
 
-DispatchStream::DispatchStream(v1::Dispatch::Stub& stub, std::uint64_t number, v1::Hello hello, EventQueue& events)
-    : stub_(stub), number_(number), events_(events), thread_([this, hello = std::move(hello)] { Run(hello); }) {}
+DispatchStream::DispatchStream(v1::Dispatch::Stub& stub, std::uint64_t number, v1::Hello hello, EventQueue& events, bool wait_until_ready)
+    : stub_(stub), number_(number), events_(events), wait_until_ready_(wait_until_ready), thread_([this, hello = std::move(hello)] { Run(hello); }) {}
 
 DispatchStream::~DispatchStream() {
   context_.TryCancel();
@@ -15,7 +15,7 @@ DispatchStream::~DispatchStream() {
 
 void DispatchStream::Run(const v1::Hello& hello) {
   // The call is made the moment the scheduler is back; a failed call would only be tried again at the channel's next look, seconds later.
-  context_.set_wait_for_ready(true);
+  context_.set_wait_for_ready(wait_until_ready_);
   call_ = stub_.Work(&context_);
   v1::WorkerMessage first;
   *first.mutable_hello() = hello;

@@ -16,7 +16,8 @@ namespace vorocast::lease {
 /// passes every message on to the queue; the last event is StreamEnded.
 class DispatchStream {
  public:
-  DispatchStream(v1::Dispatch::Stub& stub, std::uint64_t number, v1::Hello hello, EventQueue& events);
+  /// `wait_until_ready`: for a scheduler that is the only one; otherwise one that is away ends the stream at once.
+  DispatchStream(v1::Dispatch::Stub& stub, std::uint64_t number, v1::Hello hello, EventQueue& events, bool wait_until_ready = true);
   /// Cancels the call if it has not ended.
   ~DispatchStream();
 
@@ -32,6 +33,7 @@ class DispatchStream {
   v1::Dispatch::Stub& stub_;
   const std::uint64_t number_;
   EventQueue& events_;
+  const bool wait_until_ready_;
   grpc::ClientContext context_;
   std::unique_ptr<grpc::ClientReaderWriter<v1::WorkerMessage, v1::SchedulerMessage>> call_;  // set by the thread before its first event
   std::thread thread_;

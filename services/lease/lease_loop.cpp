@@ -26,6 +26,9 @@ constexpr absl::Duration kReconnectFirst = absl::Milliseconds(50);
 constexpr absl::Duration kReconnectLast = absl::Seconds(1);
 /// A connection that has not been welcomed by then is given up.
 constexpr absl::Duration kWelcomeTime = absl::Seconds(10);
+/// The same where there is another scheduler to try.
+constexpr absl::Duration kWelcomeTimeOfSeveral = absl::Seconds(3);
+constexpr absl::Duration kReconnectLastOfSeveral = absl::Milliseconds(200);
 /// How long a leaving worker waits for its last reports to be acknowledged.
 constexpr absl::Duration kFarewellTime = absl::Seconds(5);
 /// How long it waits for the scheduler to end the stream after that.
@@ -70,8 +73,10 @@ class LeaseLoop {
   LeaseLoop(const LeaseLoopOptions& options, const std::vector<tasks::Kind>& kinds)
       : options_(options),
         name_(options.name.empty() ? DefaultName() : options.name),
-        kinds_(kinds),
-        stub_(v1::Dispatch::NewStub(rpc::Connect(options.scheduler))) {}
+        kinds_(kinds) {
+    for (const std::string& address : rpc::SplitAddresses(options.scheduler))
+      schedulers_.push_back({address, v1::Dispatch::NewStub(rpc::Connect(address))});
+  }
 
   absl::Status Run() {
     const DrainSignals signals([this] { events_.Push(DrainRequested{}); });
@@ -113,7 +118,8 @@ class LeaseLoop {
 
   void ConnectAgain() {
     reconnect_.Clear();
-    welcome_.Set(kWelcomeTime);
+    const bool only_one = schedulers_.size() == 1;
+    welcome_.Set(only_one ? kWelcomeTime : kWelcomeTimeOfSeveral);
     v1::Hello hello;
     hello.set_worker(name_);
     hello.set_slots(options_.slots);
@@ -123,7 +129,7 @@ class LeaseLoop {
       if (!dropped_.contains(key)) *hello.add_holding() = IdOf(key);
     }
     for (const auto& [key, report] : reports_) *hello.add_holding() = IdOf(key);
-    stream_ = std::make_unique<DispatchStream>(*stub_, ++stream_number_, std::move(hello), events_);
+    stream_ = std::make_unique<DispatchStream>(*scheduler().stub, ++stream_number_, std::move(hello), events_, only_one);
   }
 
   void NoteAway() {
@@ -132,13 +138,14 @@ class LeaseLoop {
 
   void EndStream(const std::string& why) {
     NoteAway();
-    if (welcomed_ || !lost_) Log(fmt::format("lost the scheduler at {}: {}; trying again until it is back", options_.scheduler, why));
+    if (welcomed_ || !lost_) Log(fmt::format("lost the scheduler at {}: {}; trying again until it is back", scheduler().address, why));
     lost_ = true;
     welcomed_ = false;
     welcome_.Clear();
     stream_.reset();
     reconnect_.Set(backoff_);
-    backoff_ = std::min(2 * backoff_, kReconnectLast);
+    backoff_ = std::min(2 * backoff_, schedulers_.size() == 1 ? kReconnectLast : kReconnectLastOfSeveral);
+    scheduler_ = (scheduler_ + 1) % schedulers_.size();
   }
 
   void Send(const v1::WorkerMessage& message) {
@@ -173,7 +180,7 @@ class LeaseLoop {
     lost_ = false;
     backoff_ = kReconnectFirst;
     OpenStore(welcome.artifact_root());
-    Log(fmt::format("takes tasks from the scheduler at {}, {} at once; results go to {}", options_.scheduler, options_.slots,
+    Log(fmt::format("takes tasks from the scheduler at {}, {} at once; results go to {}", scheduler().address, options_.slots,
                     welcome.artifact_root()));
     for (const v1::AttemptId& id : welcome.drop()) Drop(id);
     for (const auto& [key, report] : reports_) SendReport(report);
@@ -313,7 +320,13 @@ class LeaseLoop {
   const LeaseLoopOptions options_;
   const std::string name_;
   const std::vector<tasks::Kind> kinds_;
-  const std::unique_ptr<v1::Dispatch::Stub> stub_;
+  struct Scheduler {
+    std::string address;
+    std::unique_ptr<v1::Dispatch::Stub> stub;
+  };
+  const Scheduler& scheduler() const { return schedulers_[scheduler_]; }
+  std::vector<Scheduler> schedulers_;
+  std::size_t scheduler_ = 0;  // the one in use
   EventQueue events_;  // outlives everything below, which pushes to it
 
   absl::StatusOr<storage::ArtifactStore> store_ = absl::UnavailableError("the scheduler has not said yet where the artifact folder is");

@@ -17,7 +17,7 @@ inline constexpr std::int32_t kSlotsMax = 4096;
 inline constexpr std::size_t kNameMax = 200;
 
 struct LeaseLoopOptions {
-  std::string scheduler;          // host:port, or unix:/path
+  std::string scheduler;          // host:port, or unix:/path; several, separated by commas, of which one leads
   std::int32_t slots = 1;         // tasks at once
   std::filesystem::path program;  // run as `program execute-task` for each task
   std::string name;               // empty: host, pid, start time

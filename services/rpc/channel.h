@@ -3,10 +3,14 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include <grpcpp/channel.h>
 
 namespace vorocast::rpc {
+
+/// "A,B" names several schedulers of one farm, one of which leads. Never empty; a list without commas has one element.
+std::vector<std::string> SplitAddresses(const std::string& list);
 
 /// A channel to "host:port" or "unix:/path", not yet connected. It finds out within five seconds that its peer has stopped answering and
 /// connects again by itself, at most a second after the peer is back. Never goes through a proxy.

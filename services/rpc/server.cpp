@@ -57,11 +57,13 @@ absl::StatusOr<std::unique_ptr<Server>> StartServer(const ServerOptions& options
   builder.SetMaxReceiveMessageSize(kMessageBytesMax);
   builder.SetMaxSendMessageSize(kMessageBytesMax);
   for (grpc::Service* service : options.services) builder.RegisterService(service);
+  if (options.everything) builder.RegisterCallbackGenericService(options.everything);
   std::unique_ptr<grpc::Server> server = builder.BuildAndStart();
   if (!server || port == 0) {
     return absl::UnavailableError(
         fmt::format("{}: cannot be listened on; another process may hold it, or the host or folder is wrong", options.listen));
   }
+  if (options.everything) server->GetHealthCheckService()->SetServingStatus(false);
   return std::unique_ptr<Server>(new Server(std::move(server), WithPort(options.listen, port)));
 }
 

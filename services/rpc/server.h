@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include <grpcpp/generic/async_generic_service.h>
 #include <grpcpp/impl/service_type.h>
 #include <grpcpp/server.h>
 
@@ -16,6 +17,8 @@ namespace vorocast::rpc {
 struct ServerOptions {
   std::string listen = "127.0.0.1:0";    // host:port, port 0 for any free one, or unix:/path
   std::vector<grpc::Service*> services;  // must outlive the server
+  /// Takes every call that no service takes; must outlive the server. With it the health service says NOT_SERVING.
+  grpc::CallbackGenericService* everything = nullptr;
 };
 
 /// A running gRPC server with reflection and the standard health service.

@@ -2,6 +2,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <map>
+#include <optional>
+
 #include <fmt/format.h>
 
 #include "scheduler/core/check.h"
@@ -14,7 +17,7 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-/// Drives the core by hand: look-ups are answered at once with "no", what it sends is kept.
+/// Drives the core by hand: look-ups are answered at once with what has been made so far, what it sends is kept.
 class Bench {
  public:
   Bench() { Happen(Restored{}); }
@@ -24,10 +27,15 @@ class Bench {
     const absl::Status status = Check(state);
     EXPECT_TRUE(status.ok()) << status;
     for (Message& message : effects.messages) messages.push_back(std::move(message));
-    for (Record& record : effects.records) records.push_back(std::move(record));
+    for (Record& record : effects.records) {
+      if (const auto* made = std::get_if<ResultMade>(&record)) results[made->key] = made->result;
+      records.push_back(std::move(record));
+    }
     for (const LookUp& look_up : effects.look_ups) {
       looked_up.push_back(look_up.key);
-      if (answer) Happen(LookUpAnswered{look_up.key, std::nullopt});
+      if (look_up.verify) ++verified;
+      const auto found = results.find(look_up.key);
+      if (answer) Happen(LookUpAnswered{look_up.key, found == results.end() ? std::nullopt : std::optional(found->second), true});
     }
   }
   void Pass(absl::Duration time) {
@@ -78,6 +86,8 @@ class Bench {
   std::vector<Message> messages;
   std::vector<Record> records;
   std::vector<base::Digest> looked_up;
+  int verified = 0;
+  std::map<base::Digest, Result> results;
 };
 
 TEST(Core, FlowsInTheOrderOfThePlan) {
@@ -250,6 +260,36 @@ TEST(Core, WhatNeedsAFailedTaskFailsWithIt) {
   EXPECT_EQ(View(bench.state, *FindJob(bench.state, "j1")).failures.size(), 1u);  // the root only
   bench.Happen(RetryJob{"j1"});
   EXPECT_THAT(bench.TakeLabels(1), ElementsAre("template"));
+}
+
+TEST(Core, ARetryOfAJobThatIsOverMakesLostResultsAgain) {
+  Bench bench;
+  bench.Job("j1", 2);
+  bench.Connect(1, "w");
+  for (auto leases = bench.TakeLeases(1); !leases.empty(); leases = bench.TakeLeases(1)) bench.Succeed(1, leases[0].id);
+  ASSERT_EQ(PhaseOf(*FindJob(bench.state, "j1")), Phase::kDone);
+  EXPECT_EQ(bench.verified, 0);
+  const auto key = std::get<Done>(bench.state.tasks[FindJob(bench.state, "j1")->by_name.at("frame 1: tessellate")].state).key;
+  bench.results.erase(key);
+  bench.Happen(RetryJob{"j1"});
+  EXPECT_GT(bench.verified, 0);
+  EXPECT_THAT(bench.TakeLabels(1), ElementsAre("frame 1: tessellate"));
+  EXPECT_EQ(View(bench.state, *FindJob(bench.state, "j1")).stages[0].done, 1);
+}
+
+TEST(Core, AForgottenJobLeavesNothingBehindAndItsResultsAreReused) {
+  Bench bench;
+  bench.Job("j1", 2);
+  bench.Happen(JobForgotten{"j1"});
+  EXPECT_TRUE(FindJob(bench.state, "j1")) << "it is not over";
+  bench.Connect(1, "w");
+  for (auto leases = bench.TakeLeases(1); !leases.empty(); leases = bench.TakeLeases(1)) bench.Succeed(1, leases[0].id);
+  bench.Happen(JobForgotten{"j1"});
+  EXPECT_FALSE(FindJob(bench.state, "j1"));
+  for (TaskIndex task = 0; task < bench.state.tasks.size(); ++task) EXPECT_TRUE(bench.state.tasks[task].inputs.empty());
+  bench.Job("j2", 2);
+  EXPECT_TRUE(bench.TakeLeases(1).empty());
+  EXPECT_EQ(PhaseOf(*FindJob(bench.state, "j2")), Phase::kDone);
 }
 
 TEST(Core, AStoppedSchedulerDoesNotBlameItsWorkers) {

@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "scheduler/store/postgres_batch.h"
+
+#include <utility>
+
+namespace vorocast::store {
+namespace {
+
+/// A statement whose parameters are arrays of one length; left out when they are empty.
+template <typename... Arrays>
+void AddStatement(std::vector<PostgresStatement>& statements, const char* sql, Arrays&... arrays) {
+  if ((arrays.empty() || ...)) return;
+  PostgresStatement& statement = statements.emplace_back();
+  statement.sql = sql;
+  (statement.parameters.Add(arrays.Take()), ...);
+}
+
+}  // namespace
+
+PostgresBatch::PostgresBatch(const std::vector<Record>& records) {
+  for (const Record& record : records) std::visit(*this, record);
+}
+
+void PostgresBatch::operator()(const core::JobRetried& record) {
+  cancelled_[record.job] = false;
+  retried_.insert(record.job);
+  ended_.erase(record.job);
+  std::erase_if(failures_, [&](const auto& failure) { return failure.first.first == record.job; });
+}
+
+std::vector<PostgresStatement> PostgresBatch::Statements() const {
+  std::vector<PostgresStatement> statements;
+  AddCaptures(statements);
+  AddJobs(statements);
+  AddRuns(statements);
+  return statements;
+}
+
+void PostgresBatch::AddCaptures(std::vector<PostgresStatement>& statements) const {
+  PostgresArray id, session, name, rate, scale, up;
+  for (const SequenceOpened* opened : opened_) {
+    id.Add(opened->id);
+    session.Add(opened->session);
+    name.Add(opened->name);
+    rate.Add(opened->frames_per_second);
+    scale.Add(opened->metres_per_unit);
+    up.Add(opened->up);
+  }
+  AddStatement(statements,
+               "INSERT INTO sequence(id, session, name, frames_per_second, metres_per_unit, up) SELECT id, session, name, rate, scale, up FROM "
+               "unnest($1::text[], $2::text[], $3::text[], $4::float8[], $5::float8[], $6::text[]) WITH ORDINALITY AS "
+               "t(id, session, name, rate, scale, up, n) ORDER BY n ON CONFLICT (id) DO NOTHING",
+               id, session, name, rate, scale, up);
+  PostgresArray sequence, number, blob, extension, size;
+  for (const auto& [key, frame] : frames_) {
+    sequence.Add(frame->sequence);
+    number.Add(std::int64_t{frame->number});
+    blob.Add(frame->blob);
+    extension.Add(frame->extension);
+    size.Add(frame->size);
+  }
+  AddStatement(statements,
+               "INSERT INTO frame SELECT * FROM unnest($1::text[], $2::int[], $3::bytea[], $4::text[], $5::bigint[]) "
+               "ON CONFLICT (sequence, number) DO UPDATE SET blob = excluded.blob, extension = excluded.extension, size = excluded.size",
+               sequence, number, blob, extension, size);
+  PostgresArray closed;
+  for (const std::string& done : closed_) closed.Add(done);
+  AddStatement(statements, "UPDATE sequence SET closed = true WHERE id = ANY($1::text[])", closed);
+}
+
+void PostgresBatch::AddJobs(std::vector<PostgresStatement>& statements) const {
+  PostgresArray id, sequence, user, priority, spec;
+  for (const JobAdded* job : jobs_) {
+    id.Add(job->id);
+    sequence.Add(job->sequence);
+    user.Add(job->user);
+    priority.Add(std::int64_t{job->priority});
+    spec.Add(job->spec_json);
+  }
+  AddStatement(statements,
+               "INSERT INTO job(id, sequence, user_name, priority, spec) SELECT id, sequence, user_name, priority, spec FROM "
+               "unnest($1::text[], $2::text[], $3::text[], $4::int[], $5::text[]) WITH ORDINALITY AS t(id, sequence, user_name, priority, spec, n) "
+               "ORDER BY n ON CONFLICT (id) DO NOTHING",
+               id, sequence, user, priority, spec);
+  PostgresArray cancelled, going_on, retried;
+  for (const auto& [job, is_cancelled] : cancelled_) (is_cancelled ? cancelled : going_on).Add(job);
+  AddStatement(statements, "UPDATE job SET cancelled = true WHERE id = ANY($1::text[])", cancelled);
+  AddStatement(statements, "UPDATE job SET cancelled = false WHERE id = ANY($1::text[])", going_on);
+  for (const std::string& job : retried_) retried.Add(job);
+  PostgresArray retried_again = retried;
+  AddStatement(statements, "DELETE FROM failure WHERE job = ANY($1::text[])", retried);
+  AddStatement(statements, "DELETE FROM ended_job WHERE job = ANY($1::text[])", retried_again);
+  PostgresArray of_job, task, cause, message;
+  for (const auto& [key, failure] : failures_) {
+    of_job.Add(failure->job);
+    task.Add(failure->task);
+    cause.Add(static_cast<std::int64_t>(failure->cause));
+    message.Add(failure->message);
+  }
+  AddStatement(statements,
+               "INSERT INTO failure SELECT * FROM unnest($1::text[], $2::text[], $3::int[], $4::text[]) "
+               "ON CONFLICT (job, task) DO UPDATE SET cause = excluded.cause, message = excluded.message",
+               of_job, task, cause, message);
+  PostgresArray ended, summary, whole;
+  for (const auto& [job, end] : ended_) {
+    ended.Add(job);
+    summary.AddBytes(end->summary);
+    whole.AddBytes(end->whole);
+  }
+  AddStatement(statements,
+               "INSERT INTO ended_job SELECT * FROM unnest($1::text[], $2::bytea[], $3::bytea[]) "
+               "ON CONFLICT (job) DO UPDATE SET summary = excluded.summary, whole = excluded.whole",
+               ended, summary, whole);
+}
+
+void PostgresBatch::AddRuns(std::vector<PostgresStatement>& statements) const {
+  PostgresArray made, sha256, size, seconds, cpu_seconds, memory_peak, made_for;
+  for (const auto& [key, result] : results_) {
+    made.Add(key);
+    sha256.Add(result->sha256);
+    size.Add(result->size);
+    seconds.Add(result->seconds);
+    cpu_seconds.Add(result->cpu_seconds);
+    memory_peak.Add(result->memory_peak);
+    made_for.Add(result->made_for);
+  }
+  AddStatement(
+      statements,
+      "INSERT INTO result SELECT * FROM unnest($1::bytea[], $2::bytea[], $3::bigint[], $4::float8[], $5::float8[], $6::bigint[], $7::text[]) "
+      "ON CONFLICT (key) DO UPDATE SET sha256 = excluded.sha256, size = excluded.size, seconds = excluded.seconds, "
+      "cpu_seconds = excluded.cpu_seconds, memory_peak = excluded.memory_peak, made_for = excluded.made_for",
+      made, sha256, size, seconds, cpu_seconds, memory_peak, made_for);
+  PostgresArray key, attempt, worker, failed, interrupted, memory_raised, ended;
+  for (const auto& [run, saved] : runs_) {
+    if (!saved) {
+      ended.Add(run);
+      continue;
+    }
+    key.Add(run);
+    attempt.Add(saved->attempt);
+    worker.Add(saved->worker);
+    failed.Add(std::int64_t{saved->tries.failed});
+    interrupted.Add(std::int64_t{saved->tries.interrupted});
+    memory_raised.Add(std::int64_t{saved->tries.memory_raised});
+  }
+  AddStatement(statements,
+               "INSERT INTO run SELECT * FROM unnest($1::bytea[], $2::bigint[], $3::text[], $4::int[], $5::int[], $6::int[]) "
+               "ON CONFLICT (key) DO UPDATE SET attempt = excluded.attempt, worker = excluded.worker, failed = excluded.failed, "
+               "interrupted = excluded.interrupted, memory_raised = excluded.memory_raised",
+               key, attempt, worker, failed, interrupted, memory_raised);
+  AddStatement(statements, "DELETE FROM run WHERE key = ANY($1::bytea[])", ended);
+  if (attempt_next_) {
+    statements.push_back({"INSERT INTO counter VALUES('attempt_next', $1) ON CONFLICT (name) DO UPDATE SET value = excluded.value",
+                          PostgresParameters().Add(*attempt_next_)});
+  }
+}
+
+}  // namespace vorocast::store
