@@ -41,8 +41,8 @@ struct Setting {
 constexpr Setting kSettings[] = {{5000, 10, 0.40, 0.0819}, {5000, 50, 1.6, 0.0807}, {14'455, 10, 1.0, 0.0814}};
 /// Of the voxels' distance sum, with as many cells (the paper reaches 0.70).
 constexpr double kGoalOfVoxels = 0.35;
-/// Delaunay balls this much wider than a cube of a cell's volume give about as many tetrahedra as cells.
-constexpr double kDelaunayLength = 3.2;
+/// Delaunay balls of this radius, in edges of a cube of a cell's volume, give about as many tetrahedra as cells.
+constexpr double kDelaunayLength = 1.6;
 
 /// What is tessellated: a shape, and the points it was made of, if any.
 struct Subject {
@@ -107,7 +107,7 @@ absl::Status AddTetGen(const Subject& subject, const Setting& setting, BenchCase
   const auto make = [&](double length) -> absl::StatusOr<Made<Tetrahedra>> {
     ASSIGN_OR_RETURN(const Tetrahedra coarse, CgalDelaunayRefinement(subject.shape.surface, length));
     const geometry::TriangleMesh surface = SurfaceOf(CellsOf(coarse));
-    return Timed([&] { return TetGenMesh(surface, 0.2 * length * length * length); });
+    return Timed([&] { return TetGenMesh(surface, 1.6 * length * length * length); });
   };
   ASSIGN_OR_RETURN(const auto made, WithCells(setting.cells, kDelaunayLength * CubeEdge(subject, setting.cells), make, TetrahedronCount));
   one.peer = "TetGen 1.5 (tetrahedra, of Mesh_3's surface)";

@@ -33,9 +33,10 @@ def judged(build, out, take):
     """Scores of a take's rows, by file name, from the stored files alone."""
     folder = out / take["take"]
     scores = {}
-    cells = [row["file"] for row in take["rows"] if row["file"].endswith(".h5")] + ["cubes.h5"]
-    surfaces = [row["file"] for row in take["rows"] if row["file"].endswith(".off")]
-    for program, arguments in (("evaluate_cells", cells), ("evaluate_surface", ["cvt_0.h5"] + surfaces)):
+    made = [row["file"] for row in take["rows"] if row["file"]]
+    cells = [name for name in made if name.endswith(".h5")] + ["cubes.h5"]
+    surfaces = [name for name in made if name.endswith(".off")]
+    for program, arguments in (("evaluate_cells", cells), ("evaluate_surface", ["cubes.h5"] + surfaces)):
         answer = folder / f"{program}.json"
         subprocess.run([build / "bin" / program, "--json", answer, *(folder / name for name in arguments)], check=True)
         for score in json.loads(answer.read_text()):
@@ -58,12 +59,16 @@ def first_table(takes):
              "|---|---|" + "---|" * len(names)]
     for index, row in enumerate(takes[0]["rows"]):
         paper = PAPER_ROWS.get(row["method"])
-        fields = [f"{paper[0]:.2f} m, {1000 * paper[0] / PAPER_POINTS:.2f} mm, {paper[1]:.2f} s" if paper else "–"]
+        fields = [f"{paper[0]:.2f} m, {1000 * paper[0] / PAPER_POINTS:.2f} mm, {paper[1]:g} s" if paper else "–"]
         for take in takes:
             mine = take["rows"][index]
+            if not mine["file"]:
+                fields.append("failed")
+                continue
             g3 = f", G3 {mine['g3']:.4f}" if mine["g3"] else ""
             fields.append(f"{mine['sum_m']:.2f} m, {mine['mean_mm']:.2f} mm, {mine['cpu_s']:.2f} s; {mine['cells']} cells{g3}")
         lines.append(f"| {row['method']} | " + " | ".join(fields) + " |")
+    # The last row's cells were made from another start, but of the same surface.
     ratio = [take["rows"][-1]["sum_m"] / take["rows"][0]["sum_m"] for take in takes]
     lines.append("| **CVT, 10 iterations, of voxels** | 0.70 | " + " | ".join(f"{value:.2f}" for value in ratio) + " |")
     return lines
@@ -92,8 +97,8 @@ def chart(takes):
 
     return {"title": "The paper's Table 1, measured here",
             "panels": [panel("Mean distance of the input points to the surface (mm)", False, lambda row: 1000 * row[0] / PAPER_POINTS,
-                             lambda row: row["mean_mm"]),
-                       panel("CPU time (s), logarithmic", True, lambda row: row[1], lambda row: row["cpu_s"])]}
+                             lambda row: row.get("mean_mm")),
+                       panel("CPU time (s), logarithmic", True, lambda row: row[1], lambda row: row.get("cpu_s"))]}
 
 
 def main():
@@ -104,6 +109,8 @@ def main():
     for take in takes:
         scores = judged(build, out, take)
         for row in take["rows"]:
+            if not row["file"]:
+                continue
             score = scores[row["file"]]
             row["sum_m"] = score["distance_sum_m"]
             row["mean_mm"] = 1000 * score["distance_sum_m"] / score["points"]

@@ -53,13 +53,13 @@ Tetrahedra FromCgal(const Complex& complex) {
 
 }  // namespace
 
-absl::StatusOr<Tetrahedra> CgalDelaunayRefinement(const geometry::TriangleMesh& surface, double ball_diameter_m) {
+absl::StatusOr<Tetrahedra> CgalDelaunayRefinement(const geometry::TriangleMesh& surface, double ball_radius_m) {
   namespace parameters = CGAL::parameters;
   try {
     const Mesh mesh = ToCgal(surface);
     const Domain domain(mesh);
-    const Criteria criteria(parameters::facet_angle = 25, parameters::facet_size = ball_diameter_m / 2, parameters::cell_radius_edge_ratio = 3,
-                            parameters::cell_size = ball_diameter_m / 2);
+    const Criteria criteria(parameters::facet_angle = 25, parameters::facet_size = ball_radius_m, parameters::cell_radius_edge_ratio = 3,
+                            parameters::cell_size = ball_radius_m);
     return FromCgal(CGAL::make_mesh_3<Complex>(domain, criteria));
   } catch (const std::exception& error) {
     return absl::InternalError(fmt::format("CGAL Mesh_3: {}", error.what()));

@@ -10,7 +10,7 @@
 namespace vorocast::bench {
 
 /// CGAL's Delaunay refinement (Mesh_3, make_mesh_3) of the solid inside a closed surface, at its defaults of optimisation. No Delaunay ball, of
-/// surface triangles as of tetrahedra, is wider than `ball_diameter_m` (the paper, section 3.3: the diagonal of a voxel). INTERNAL on a CGAL error.
-absl::StatusOr<Tetrahedra> CgalDelaunayRefinement(const geometry::TriangleMesh& surface, double ball_diameter_m);
+/// surface triangles as of tetrahedra, has a larger radius than `ball_radius_m`. INTERNAL on a CGAL error.
+absl::StatusOr<Tetrahedra> CgalDelaunayRefinement(const geometry::TriangleMesh& surface, double ball_radius_m);
 
 }  // namespace vorocast::bench
