@@ -53,10 +53,10 @@ const fs::path& Scratch() {
   return folder.path;
 }
 
-Running::Running(const std::vector<std::string>& arguments) {
+Running::Running(const std::vector<std::string>& arguments, const std::string& name) {
   static int count = 0;
   log_ = Scratch() / fmt::format("output-{}.txt", count++);
-  const std::string program = (fs::path(VOROCAST_PROGRAMS) / "vorocast").string();
+  const std::string program = (fs::path(VOROCAST_PROGRAMS) / name).string();
   std::vector<char*> argv = {const_cast<char*>(program.c_str())};
   for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
   argv.push_back(nullptr);

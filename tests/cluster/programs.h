@@ -16,15 +16,16 @@ struct Outcome {
   std::string output;  // standard output and error together
 };
 
-/// A running `vorocast …`; killed when it goes out of scope.
+/// A running `vorocast …`, or another of the programs; killed when it goes out of scope.
 class Running {
  public:
-  explicit Running(const std::vector<std::string>& arguments);
+  explicit Running(const std::vector<std::string>& arguments, const std::string& program = "vorocast");
   ~Running();
   Running(const Running&) = delete;
   Running& operator=(const Running&) = delete;
 
   void Signal(int signal_number) const;
+  pid_t pid() const { return pid_; }
   /// Waits for its end, at most five minutes.
   Outcome Wait();
 
