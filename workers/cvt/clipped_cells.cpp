@@ -38,6 +38,7 @@ absl::Status ClippedCells::Evaluate(const std::vector<Vec3>& sites, ClippedCompl
   sites_ = sites;
   complex_ = complex;
   if (Attempt()) return absl::OkStatus();
+  diagram_.Forget();
   // Either the surface crosses itself, so that the winding must be looked up, or a tie must be broken.
   if (!by_rays_) {
     by_rays_ = true;
@@ -45,6 +46,7 @@ absl::Status ClippedCells::Evaluate(const std::vector<Vec3>& sites, ClippedCompl
   }
   double shift = 1e-9 * solid_.Spacing(sites.size());
   for (int attempt = 0; attempt < kAttempts; ++attempt, shift *= 4) {
+    diagram_.Forget();
     base::Random random(static_cast<std::uint64_t>(attempt));
     for (std::size_t i = 0; i < sites.size(); ++i) {
       for (int a = 0; a < 3; ++a) sites_[i][a] = sites[i][a] + random.Uniform(-shift, shift);
@@ -138,14 +140,19 @@ bool ClippedCells::FindNearestSites() {
 bool ClippedCells::AddSurface() {
   queued_in_.assign(sites_.size(), -1);
   cuts_.Start();
+  if (complex_) {
+    complex_->pieces.reserve(3 * solid_.triangles.size() / 2);
+    complex_->corners.reserve(2 * solid_.triangles.size());
+  }
   for (std::int32_t t = 0; t < static_cast<std::int32_t>(solid_.triangles.size()); ++t) {
     const auto& [a, b, c] = solid_.triangles[t];
     const std::int32_t site = nearest_[a];
-    if (nearest_[b] == site && nearest_[c] == site && !complex_) {
+    if (nearest_[b] == site && nearest_[c] == site) {
       // Cells are convex: all of the triangle lies in the cell.
       moments_[site].AddCone(solid_.vertices[a] - sites_[site], solid_.vertices[b] - sites_[site], solid_.vertices[c] - sites_[site]);
       boundary_[site] = 1;
-    } else if ((nearest_[b] != site || nearest_[c] != site) && cuts_.Cut(t, nearest_, complex_ != nullptr, &cut_)) {
+      if (complex_) complex_->pieces.push_back({site, t, 0, 0});
+    } else if (cuts_.Cut(t, nearest_, complex_ != nullptr, &cut_)) {
       AddCut(t, cut_);
     } else if (!AddTriangle(t)) {
       return false;

@@ -31,7 +31,7 @@ struct ClippedComplex {
     std::int32_t cell;
     std::int32_t triangle;
     std::int64_t corner_begin;
-    std::int32_t corner_count;
+    std::int32_t corner_count;  // 0 when the piece is the whole triangle
   };
   std::vector<geometry::Vec3> sites;  // as clipped: given ones, moved by a hair if that was needed
   std::vector<Piece> pieces;          // by triangle
@@ -64,6 +64,7 @@ class ClippedCells {
   const std::vector<std::uint8_t>& boundary() const { return boundary_; }
   const VoronoiDiagram& diagram() const { return diagram_; }
   double energy() const { return energy_; }
+  const Solid& solid() const { return solid_; }
 
  private:
   bool Attempt();

@@ -27,6 +27,14 @@ void ConvexCell::Reserve(std::int32_t corners) {
   new_corners_.resize(3 * size + 1);
 }
 
+/// Makes room for so many corners, to be filled; positions past them read as zero.
+void ConvexCell::Clear(std::int32_t corners) {
+  Reserve(corners);
+  const std::int32_t old = Padded(count_);
+  count_ = corners;
+  for (std::int32_t i = count_; i < old; ++i) x_[i] = y_[i] = z_[i] = 0;
+}
+
 void ConvexCell::StartAsCube(double half_side) {
   planes_.clear();
   names_.clear();
@@ -95,17 +103,13 @@ const ConvexCell& ConvexCell::UnitDodecahedron() {
 
 void ConvexCell::Reset(double reach) {
   const ConvexCell& unit = UnitDodecahedron();
-  Reserve(unit.count_);
-  // The old cell's positions past the new count must read as zero.
-  const std::int32_t old = Padded(count_);
-  count_ = unit.count_;
+  Clear(unit.count_);
   for (std::int32_t i = 0; i < count_; ++i) {
     x_[i] = reach * unit.x_[i];
     y_[i] = reach * unit.y_[i];
     z_[i] = reach * unit.z_[i];
     corners_[i] = unit.corners_[i];
   }
-  for (std::int32_t i = count_; i < old; ++i) x_[i] = y_[i] = z_[i] = 0;
   planes_.resize(unit.planes_.size());
   for (std::size_t p = 0; p < planes_.size(); ++p) planes_[p] = {reach * unit.planes_[p].p, reach * reach};
   names_ = unit.names_;

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "services/geometry/vector.h"
@@ -28,6 +29,24 @@ class ConvexCell {
 
   /// Starts anew from a dodecahedron that contains the ball of radius `reach`; its planes carry the names −1 … −12.
   void Reset(double reach);
+
+  /// Starts from a polyhedron whose corner i has the given planes, neighbours and position.
+  template <typename Corners, typename Position>
+  void Resume(std::span<const HalfSpace> planes, std::span<const std::int32_t> names, const Corners& corners, Position&& position) {
+    Clear(static_cast<std::int32_t>(corners.size()));
+    for (std::int32_t i = 0; i < count_; ++i) {
+      for (int s = 0; s < 3; ++s) {
+        corners_[i].plane[s] = corners[i].plane[s];
+        corners_[i].next[s] = corners[i].next[s];
+      }
+      const geometry::Vec3 at = position(i);
+      x_[i] = at.x(), y_[i] = at.y(), z_[i] = at.z();
+    }
+    planes_.assign(planes.begin(), planes.end());
+    names_.assign(names.begin(), names.end());
+    starting_at_.assign(planes_.size(), -1);
+    UpdateRadius();
+  }
 
   /// Keeps the side of the origin of the plane through p across p. `name` is the neighbour's number.
   /// False when rounding made the cut contradict itself, or when p is the origin; the cell is then void until the next Reset.
@@ -58,6 +77,7 @@ class ConvexCell {
   void StartAsCube(double half_side);
   void DropUnusedPlanes();
   void Reserve(std::int32_t corners);
+  void Clear(std::int32_t corners);
   void FindCrossedEdges();
   bool IsOneLoop();
   void Link(std::int32_t plane);

@@ -30,6 +30,15 @@ inline double HighestOf(const Lanes& lanes) {
 
 inline std::int64_t SumOf(const LaneMask& lanes) { return lanes[0] + lanes[1] + lanes[2] + lanes[3]; }
 
+/// A bit for each lane in which the comparison holds.
+inline unsigned BitsOf(const LaneMask& lanes) {
+#ifdef __AVX__
+  return static_cast<unsigned>(__builtin_ia32_movmskpd256(reinterpret_cast<Lanes>(lanes)));
+#else
+  return static_cast<unsigned>((lanes[0] & 1) | (lanes[1] & 2) | (lanes[2] & 4) | (lanes[3] & 8));
+#endif
+}
+
 /// The four sums over the lanes of a, b, c and d.
 inline Lanes SumsOf(const Lanes& a, const Lanes& b, const Lanes& c, const Lanes& d) {
   const Lanes ab = __builtin_shufflevector(a, b, 0, 4, 2, 6) + __builtin_shufflevector(a, b, 1, 5, 3, 7);

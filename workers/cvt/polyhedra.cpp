@@ -65,13 +65,14 @@ class Assembler {
         complex_(complex),
         cells_(*cells),
         first_cell_(static_cast<std::int32_t>(cells->size())),
-        table_(complex.corners.size() / 4 + 7 * complex.sites.size(), &cells->vertices) {}
+        table_(complex.corners.size() / 6 + 7 * complex.sites.size(), &cells->vertices),
+        number_of_(clipped.solid().vertices.size(), -1) {}
 
   absl::Status Run() {
     if (cells_.face_offset.empty()) cells_.face_offset.push_back(0);
     if (cells_.vertex_offset.empty()) cells_.vertex_offset.push_back(0);
     SortPieces();
-    cells_.vertices.reserve(cells_.vertices.size() + complex_.corners.size() / 3 + 7 * complex_.sites.size());
+    cells_.vertices.reserve(cells_.vertices.size() + clipped_.solid().vertices.size() + complex_.corners.size() / 4 + 7 * complex_.sites.size());
     for (std::int32_t i = 0; i < static_cast<std::int32_t>(complex_.sites.size()); ++i) {
       if (!AppendCell(i)) return absl::InternalError(fmt::format("the outlines of cell {}'s faces do not close", first_cell_ + i));
     }
@@ -136,15 +137,27 @@ class Assembler {
     cells_.neighbour.push_back(neighbour);
   }
 
+  std::int32_t MeshVertex(std::int32_t vertex) {
+    std::int32_t& number = number_of_[vertex];
+    if (number < 0) {
+      number = static_cast<std::int32_t>(cells_.vertices.size());
+      cells_.vertices.push_back(clipped_.solid().vertices[vertex]);
+    }
+    return number;
+  }
+
   /// The surface in the cell; its edges on bisectors, the other way round, outline the faces there.
   void AddPieces(std::int32_t site) {
     const auto names = clipped_.diagram().names(clipped_.diagram().cell(site));
     for (std::int64_t p = piece_begin_[site]; p < piece_begin_[site + 1]; ++p) {
       const ClippedComplex::Piece& piece = complex_.pieces[piece_order_[p]];
       const std::size_t begin = surface_.size();
+      if (piece.corner_count == 0) {
+        for (std::int32_t v : clipped_.solid().triangles[piece.triangle]) surface_.push_back(MeshVertex(v));
+      }
       for (std::int32_t c = 0; c < piece.corner_count; ++c) {
         const ClippedComplex::Corner& corner = complex_.corners[piece.corner_begin + c];
-        surface_.push_back(table_.Number(corner.key, corner.position));
+        surface_.push_back(corner.key.kind == VertexKey::kMeshVertex ? MeshVertex(corner.key.id[0]) : table_.Number(corner.key, corner.position));
       }
       surface_begin_.push_back(surface_.size());
       for (std::int32_t c = 0; c < piece.corner_count; ++c) {
@@ -220,7 +233,8 @@ class Assembler {
   const ClippedComplex& complex_;
   geometry::Cells& cells_;
   const std::int32_t first_cell_;
-  VertexTable table_;
+  VertexTable table_;                      // of all vertices but the mesh's
+  std::vector<std::int32_t> number_of_;    // [mesh vertices] or −1
   std::vector<std::int64_t> piece_begin_;  // [n+1]
   std::vector<std::int32_t> piece_order_;
 

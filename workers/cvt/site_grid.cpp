@@ -54,9 +54,14 @@ void SiteGrid::Build(const std::vector<Vec3>& sites, double side) {
   const auto index = [&](const Vec3& site) { return static_cast<std::size_t>(Index(BoxOf(site))); };
   for (const Vec3& site : sites) ++begin_[index(site) + 1];
   for (std::size_t b = 1; b < begin_.size(); ++b) begin_[b] += begin_[b - 1];
-  entries_.resize(sites.size());
+  for (auto* values : {&x_, &y_, &z_}) values->assign(sites.size() + 4, std::numeric_limits<double>::infinity());
+  site_.resize(sites.size());
   std::vector<std::int32_t> next(begin_.begin(), begin_.end() - 1);
-  for (std::size_t i = 0; i < sites.size(); ++i) entries_[next[index(sites[i])]++] = {sites[i], static_cast<std::int32_t>(i)};
+  for (std::size_t i = 0; i < sites.size(); ++i) {
+    const std::int32_t e = next[index(sites[i])]++;
+    x_[e] = sites[i].x(), y_[e] = sites[i].y(), z_[e] = sites[i].z();
+    site_[e] = static_cast<std::int32_t>(i);
+  }
 }
 
 std::array<std::int32_t, 3> SiteGrid::BoxOf(const Vec3& point) const {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
@@ -10,6 +11,7 @@
 #include <vector>
 
 #include "services/geometry/vector.h"
+#include "workers/cvt/lanes.h"
 
 namespace vorocast::cvt {
 
@@ -40,6 +42,10 @@ class SiteGrid {
   template <typename Radius, typename Visit>
   void Around(const geometry::Vec3& centre, Radius&& radius_squared, Visit&& visit) const;
 
+  /// Calls visit(entry) for the sites less than sqrt(radius_squared) from `centre`, in the order of the boxes.
+  template <typename Visit>
+  void Within(const geometry::Vec3& centre, double radius_squared, Visit&& visit) const;
+
  private:
   /// A box relative to another one, and the least squared distance between points of the two, in box sides.
   struct Offset {
@@ -61,16 +67,18 @@ class SiteGrid {
   std::int64_t Index(const std::array<std::int32_t, 3>& box) const {
     return (static_cast<std::int64_t>(box[2]) * size_[1] + box[1]) * size_[0] + box[0];
   }
+  Entry At(std::int32_t e) const { return {{x_[e], y_[e], z_[e]}, site_[e]}; }
   template <typename Visit>
   void VisitBox(std::int64_t box, Visit&& visit) const {
-    for (std::int32_t e = begin_[box]; e < begin_[box + 1]; ++e) visit(entries_[e]);
+    for (std::int32_t e = begin_[box]; e < begin_[box + 1]; ++e) visit(At(e));
   }
 
   geometry::Vec3 low_ = geometry::Vec3::Zero();
   double side_ = 1;
   std::array<std::int32_t, 3> size_{1, 1, 1};
   std::vector<std::int32_t> begin_;
-  std::vector<Entry> entries_;
+  std::vector<double> x_, y_, z_;   // by box; padded by 4 places infinitely far away
+  std::vector<std::int32_t> site_;  // as x_
 };
 
 template <typename Radius, typename Visit>
@@ -102,6 +110,30 @@ void SiteGrid::Around(const geometry::Vec3& centre, Radius&& radius_squared, Vis
         for (std::int32_t x = home[0] - ring; x <= home[0] + ring; x += shell ? 1 : 2 * ring) {
           if (SquaredGap(centre, 0, x) + SquaredGap(centre, 1, y) + SquaredGap(centre, 2, z) <= radius_squared()) VisitBox(Index({x, y, z}), visit);
         }
+      }
+    }
+  }
+}
+
+template <typename Visit>
+void SiteGrid::Within(const geometry::Vec3& centre, double radius_squared, Visit&& visit) const {
+  const geometry::Vec3 radius = geometry::Vec3::Constant(std::sqrt(radius_squared) * (1 + 1e-9));
+  const std::array<std::int32_t, 3> low = BoxOf(centre - radius);
+  const std::array<std::int32_t, 3> high = BoxOf(centre + radius);
+  const Lanes limit = Splat(radius_squared);
+  for (std::int32_t z = low[2]; z <= high[2]; ++z) {
+    const double gap = SquaredGap(centre, 2, z);
+    for (std::int32_t y = low[1]; y <= high[1]; ++y) {
+      if (gap + SquaredGap(centre, 1, y) > radius_squared) continue;
+      // Boxes along x follow one another.
+      const std::int32_t end = begin_[Index({high[0], y, z}) + 1];
+      for (std::int32_t e = begin_[Index({low[0], y, z})]; e < end; e += 4) {
+        const Lanes dx = LoadLanes(&x_[e]) - centre.x();
+        const Lanes dy = LoadLanes(&y_[e]) - centre.y();
+        const Lanes dz = LoadLanes(&z_[e]) - centre.z();
+        unsigned bits = BitsOf(dx * dx + dy * dy + dz * dz < limit);
+        if (end - e < 4) bits &= (1U << (end - e)) - 1;
+        for (; bits != 0; bits &= bits - 1) visit(At(e + std::countr_zero(bits)));
       }
     }
   }

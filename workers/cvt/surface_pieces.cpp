@@ -40,10 +40,8 @@ bool TriangleClipper::Clip(std::int32_t triangle, std::int32_t site, SurfacePiec
     corner.weight[m] = 1;
   }
   if (bisectors_.size() < planes.size()) bisectors_.resize(planes.size());
-  const double furthest = std::max({own_distance_[0], own_distance_[1], own_distance_[2]});
   for (std::int32_t p = 0; p < cell.plane_count; ++p) {
     const HalfSpace& plane = planes[p];
-    if (plane.square * kSafety > furthest) break;  // planes come nearest first: none reaches the triangle from here on
     const double highest = std::max({plane.p.dot(seen[0]), plane.p.dot(seen[1]), plane.p.dot(seen[2])});
     if (names[p] < 0 || highest < plane.square * kSafety) continue;
     bisectors_[p].name = names[p];

@@ -3,14 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 namespace vorocast::cvt {
 
 using geometry::Vec3;
 
 namespace {
-constexpr std::int32_t kLeafSize = 6;
+constexpr std::int32_t kLeafSize = 8;
 }  // namespace
 
 Vec3 NearestOnTriangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
@@ -40,33 +39,42 @@ Vec3 NearestOnTriangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& 
 
 TriangleTree::TriangleTree(const std::vector<Vec3>& vertices, const std::vector<std::array<std::int32_t, 3>>& triangles)
     : vertices_(vertices), triangles_(triangles) {
-  std::vector<Vec3> middle;
-  middle.reserve(triangles.size());
-  for (const auto& t : triangles) middle.push_back((vertices[t[0]] + vertices[t[1]] + vertices[t[2]]) / 3);
-  order_.resize(triangles.size());
-  std::iota(order_.begin(), order_.end(), 0);
-  nodes_.reserve(triangles.size());
-  Split(0, static_cast<std::int32_t>(order_.size()), middle);
+  std::vector<Item> items;
+  items.reserve(triangles.size());
+  for (const auto& t : triangles) {
+    const Vec3 middle = (vertices[t[0]] + vertices[t[1]] + vertices[t[2]]) / 3;
+    items.push_back({middle.cast<float>(), static_cast<std::int32_t>(items.size())});
+  }
+  nodes_.reserve(2 * triangles.size() / kLeafSize + 2);
+  Split(0, static_cast<std::int32_t>(items.size()), items);
+  order_.reserve(items.size());
+  for (const Item& item : items) order_.push_back(item.triangle);
 }
 
 /// Halves the triangles along the longest side of their middles' box. Returns the node's number.
-std::int32_t TriangleTree::Split(std::int32_t begin, std::int32_t end, const std::vector<Vec3>& middle) {
+std::int32_t TriangleTree::Split(std::int32_t begin, std::int32_t end, std::vector<Item>& items) {
   const auto at = static_cast<std::int32_t>(nodes_.size());
-  Node node{{}, begin, end, 0};
-  geometry::Box3 middles;
-  for (std::int32_t i = begin; i < end; ++i) {
-    for (std::int32_t v : triangles_[order_[i]]) node.box.extend(vertices_[v]);
-    middles.extend(middle[order_[i]]);
+  nodes_.push_back({{}, begin, end, 0});
+  if (end - begin <= kLeafSize) {
+    geometry::Box3 box;
+    for (std::int32_t i = begin; i < end; ++i) {
+      for (std::int32_t v : triangles_[items[i].triangle]) box.extend(vertices_[v]);
+    }
+    nodes_[at].box = box;
+    return at;
   }
-  nodes_.push_back(node);
-  if (end - begin <= kLeafSize) return at;
+  Eigen::AlignedBox3f middles;
+  for (std::int32_t i = begin; i < end; ++i) middles.extend(items[i].middle);
   Eigen::Index axis = 0;
   middles.sizes().maxCoeff(&axis);
   const std::int32_t half = begin + (end - begin) / 2;
-  std::nth_element(order_.begin() + begin, order_.begin() + half, order_.begin() + end,
-                   [&](std::int32_t a, std::int32_t b) { return middle[a][axis] != middle[b][axis] ? middle[a][axis] < middle[b][axis] : a < b; });
-  Split(begin, half, middle);
-  nodes_[at].right = Split(half, end, middle);
+  std::nth_element(items.begin() + begin, items.begin() + half, items.begin() + end, [axis](const Item& a, const Item& b) {
+    return a.middle[axis] != b.middle[axis] ? a.middle[axis] < b.middle[axis] : a.triangle < b.triangle;
+  });
+  const std::int32_t left = Split(begin, half, items);
+  const std::int32_t right = Split(half, end, items);
+  nodes_[at].right = right;
+  nodes_[at].box = nodes_[left].box.merged(nodes_[right].box);
   return at;
 }
 

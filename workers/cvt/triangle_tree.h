@@ -28,7 +28,11 @@ class TriangleTree {
     std::int32_t begin, end;  // of order_
     std::int32_t right;       // the left child follows its parent; 0 for a leaf
   };
-  std::int32_t Split(std::int32_t begin, std::int32_t end, const std::vector<geometry::Vec3>& middle);
+  struct Item {
+    geometry::Vec3f middle;
+    std::int32_t triangle;
+  };
+  std::int32_t Split(std::int32_t begin, std::int32_t end, std::vector<Item>& items);
   double SquaredDistanceTo(std::int32_t triangle, const geometry::Vec3& point) const;
 
   const std::vector<geometry::Vec3>& vertices_;

@@ -8,6 +8,7 @@
 #include "services/geometry/vector.h"
 #include "workers/cvt/convex_cell.h"
 #include "workers/cvt/lanes.h"
+#include "workers/cvt/moved_cell.h"
 #include "workers/cvt/site_grid.h"
 #include "workers/cvt/tessellate.h"
 
@@ -17,24 +18,21 @@ namespace vorocast::cvt {
 /// looks like further away than that is not computed, and who needs it asks for a larger reach. Positions are relative to the site.
 class VoronoiDiagram {
  public:
-  struct Corner {
-    geometry::Vec3 position;
-    std::array<std::uint16_t, 3> plane;  // of the cell; as ConvexCell::Corner
-    std::array<std::uint16_t, 3> next;   // of the cell
-  };
+  using Corner = CellCorner;
   struct Cell {
     std::int64_t plane_begin = 0;
     std::int64_t corner_begin = 0;
     std::int32_t plane_count = 0;
     std::int32_t corner_count = 0;
-    double reach = 0;          // the cell is right within this distance of its site
-    double inner_squared = 0;  // squared distance to the nearest bisector
-    bool truncated = false;    // some corner is of the reach's making
+    double reach = 0;        // the cell is right within this distance of its site
+    bool truncated = false;  // some corner is of the reach's making
   };
 
-  /// Cells of `sites`, those of the last call with as many sites being taken as first candidates for neighbours.
+  /// Cells of `sites`. Those of the last call with as many sites are the first guess, and as candidates for neighbours the second.
   /// False when rounding left a cell contradictory: move the sites by a hair.
   bool Build(const std::vector<geometry::Vec3>& sites, double spacing, Neighbours neighbours);
+  /// Takes nothing from the last call.
+  void Forget() { cells_.clear(); }
   /// Computes one cell again with a larger reach.
   bool Enlarge(std::int32_t site, double reach);
 
@@ -63,7 +61,10 @@ class VoronoiDiagram {
   std::size_t size() const { return cells_.size(); }
 
  private:
+  bool Move(std::int32_t site, const Cell& last);
   bool BuildCell(std::int32_t site, double reach, std::span<const std::int32_t> candidates);
+  bool CutByOthers(std::int32_t site, bool nearly_done);
+  void Pad();
   void Store(std::int32_t site, double reach);
 
   std::vector<geometry::Vec3> sites_;
@@ -71,13 +72,18 @@ class VoronoiDiagram {
   SiteGrid grid_;
   ConvexCell work_;
   std::vector<std::int32_t> order_, renumbered_;  // scratch of Store
-  std::vector<std::int32_t> seen_;                // [n] the site that last tried this one as a neighbour
+  MovedCell moved_;
+  std::vector<HalfSpace> moved_planes_;
+  std::vector<std::int32_t> seen_;  // [n] the round in which this one was last tried as a neighbour
+  std::int32_t round_ = 0;          // a cell's
 
   std::vector<Cell> cells_;
   std::vector<HalfSpace> planes_;    // each cell's padded to a multiple of 4 by such as nothing lies beyond
   std::vector<std::int32_t> names_;  // as planes_
   std::vector<Corner> corners_;
   std::vector<Cell> last_cells_;
+  std::vector<HalfSpace> last_planes_;
+  std::vector<Corner> last_corners_;
   std::vector<std::int32_t> last_names_;
   std::vector<std::vector<std::int32_t>> delaunay_;  // with Neighbours::kTetGen
 };
