@@ -171,11 +171,16 @@ class Assembler {
   }
 
   /// An end of an edge that lies in the solid: with `times` 1 the edge's part in the solid begins there, with −1 it ends there.
-  void AddEnd(std::int32_t site, const VoronoiDiagram::Corner& corner, std::span<const std::int32_t> names, double at, std::int32_t times) {
+  void AddEnd(std::int32_t site, std::size_t v, std::span<const VoronoiDiagram::Corner> corners, std::span<const std::int32_t> names, double at,
+              std::int32_t times) {
     if (times == 0) return;
-    VertexKey key{VertexKey::kVoronoiVertex, {site, names[corner.plane[0]], names[corner.plane[1]], names[corner.plane[2]]}};
-    std::ranges::sort(key.id);
-    const std::int32_t vertex = table_.Number(key, complex_.sites[site] + corner.position);
+    std::int32_t& vertex = number_of_corner_[v];
+    if (vertex < 0) {
+      const VoronoiDiagram::Corner& corner = corners[v];
+      VertexKey key{VertexKey::kVoronoiVertex, {site, names[corner.plane[0]], names[corner.plane[1]], names[corner.plane[2]]}};
+      std::ranges::sort(key.id);
+      vertex = table_.Number(key, complex_.sites[site] + corner.position);
+    }
     std::vector<OnEdge>& list = times > 0 ? enters_ : leaves_;
     list.insert(list.end(), static_cast<std::size_t>(std::abs(times)), {at, vertex});
   }
@@ -186,6 +191,7 @@ class Assembler {
     const auto names = clipped_.diagram().names(cell);
     const auto corners = clipped_.diagram().corners(cell);
     const std::int64_t begin = complex_.winding_begin[site];
+    number_of_corner_.assign(corners.size(), -1);
     const auto winding = [&](std::size_t v) { return begin < 0 ? 1 : complex_.winding[begin + static_cast<std::int64_t>(v)]; };
     for (std::size_t v = 0; v < corners.size(); ++v) {
       for (int s = 0; s < 3; ++s) {
@@ -195,9 +201,9 @@ class Assembler {
         const std::int32_t left = corners[v].plane[(s + 2) % 3];
         enters_.clear();
         leaves_.clear();
-        AddEnd(site, corners[v], names, 0, winding(v));
+        AddEnd(site, v, corners, names, 0, winding(v));
         CollectCrossings(site, names[left], names[right], corners[v].position, corners[w].position);
-        AddEnd(site, corners[w], names, 2, -winding(w));
+        AddEnd(site, w, corners, names, 2, -winding(w));
         // Sorted along the edge, entering and leaving alternate; their numbers agree by the corners' winding.
         std::ranges::sort(enters_, {}, &OnEdge::at);
         std::ranges::sort(leaves_, {}, &OnEdge::at);
@@ -239,6 +245,7 @@ class Assembler {
   std::vector<std::int32_t> piece_order_;
 
   // Of the cell under way.
+  std::vector<std::int32_t> number_of_corner_;     // [corners] or −1
   std::vector<std::vector<OutlineEdge>> outline_;  // [planes]
   std::vector<std::int32_t> surface_;              // vertices of the surface pieces
   std::vector<std::size_t> surface_begin_;
