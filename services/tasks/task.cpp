@@ -24,7 +24,7 @@ struct KindTraits {
   std::string_view extension;
 };
 constexpr KindTraits kTraits[] = {
-    {Kind::kTessellate, "tessellate", 1, ".h5"}, {Kind::kTemplate, "template", 1, ".h5"}, {Kind::kStretch, "stretch", 1, ".h5"}, {Kind::kGuide, "guide", 2, ".h5"},
+    {Kind::kTessellate, "tessellate", 2, ".h5"}, {Kind::kTemplate, "template", 2, ".h5"}, {Kind::kStretch, "stretch", 1, ".h5"}, {Kind::kGuide, "guide", 2, ".h5"},
     {Kind::kTrack, "track", 1, ".h5"},           {Kind::kAssemble, "assemble", 1, ".h5"}, {Kind::kSimulate, "simulate", 2, ".h5"},
     {Kind::kSheet, "sheet", 1, ".png"},
 };
