@@ -20,6 +20,10 @@ def figure(name, value):
     return f"{name.replace('_', ' ')} " + (f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.4g}")
 
 
+def ratio(theirs, ours):
+    return f"{theirs / ours:,.0f}" if theirs / ours >= 1000 else f"{theirs / ours:.3g}"
+
+
 def figures(values):
     return "; ".join(figure(name, value) for name, value in sorted(values.items())) or "–"
 
@@ -45,7 +49,7 @@ def bench_table(cases):
         peer = "–"
         if case["peer"]:
             time = f": {case['peer_cpu_s']:.4g} s" if case["peer_cpu_s"] is not None else ""
-            faster = f" ({case['peer_cpu_s'] / case['cpu_s']:.3g} × ours)" if case["peer_cpu_s"] and case["cpu_s"] else ""
+            faster = f" ({ratio(case['peer_cpu_s'], case['cpu_s'])} × ours)" if case["peer_cpu_s"] and case["cpu_s"] else ""
             quality = f"; {figures(case['peer_quality'])}" if case["peer_quality"] else ""
             peer = f"{case['peer']}{time}{faster}{quality}"
         name = f"`{case['case']}`" + (f"<br>{case['input']}" if case.get("input") else "")

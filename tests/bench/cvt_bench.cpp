@@ -127,6 +127,11 @@ absl::Status AddVoxels(const Subject& subject, const Setting& setting, BenchCase
   AddPointSums(subject, voxels.result.surface, one.peer_quality);
   one.quality["point_sum_of_voxels"] = one.quality["point_sum_m"] / one.peer_quality["point_sum_m"];
   one.goal["point_sum_of_voxels"] = kGoalOfVoxels;
+  if (!subject.truth.empty()) {
+    // Without the noise, which is the same for both.
+    one.quality["truth_sum_of_voxels"] = one.quality["truth_sum_m"] / one.peer_quality["truth_sum_m"];
+    one.goal["truth_sum_of_voxels"] = kGoalOfVoxels;
+  }
   return absl::OkStatus();
 }
 
