@@ -13,6 +13,8 @@ constexpr std::int32_t kTemplateIterations = 50;
 constexpr std::int32_t kSheetPictures = 12;
 /// So many frames are looked at for the template: neighbouring ones are alike, and a task that reads them all would hold up a long take.
 constexpr std::size_t kTemplateCandidates = 64;
+/// A stretch brings the template so near to what was seen in a seam that half of the usual iterations are as good.
+constexpr std::int32_t kSeamIterations = 5;
 constexpr std::string_view kTemplate = "template";
 constexpr std::string_view kGuide = "guide";
 constexpr std::string_view kAssemble = "assemble";
@@ -93,7 +95,9 @@ PlannedStretches Stretches(const JobSpec& job, const std::vector<PlannedFrame>& 
 
 /// Coarse poses: of all frames, or where the take's stretches meet.
 PlannedTask Guide(const std::vector<PlannedFrame>& frames, const PlannedStretches& stretches) {
-  PlannedTask task{.name = std::string(kGuide), .kind = tasks::Kind::kGuide, .options = tasks::ToJson(tasks::GuideOptions{})};
+  tasks::GuideOptions options;
+  if (!stretches.tasks.empty()) options.iterations = kSeamIterations;
+  PlannedTask task{.name = std::string(kGuide), .kind = tasks::Kind::kGuide, .options = tasks::ToJson(options)};
   task.inputs.push_back(Result("template", std::string(kTemplate)));
   for (const PlannedTask& stretch : stretches.tasks) task.inputs.push_back(Result("stretch", stretch.name));
   if (stretches.tasks.empty()) {

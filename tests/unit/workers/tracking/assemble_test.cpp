@@ -139,5 +139,33 @@ TEST(CarryPoints, BendsSmoothlyBetweenPatches) {
   EXPECT_LT(blended / static_cast<double>(carried.size()), 0.002);
 }
 
+TEST(Assemble, WindowsThatDisagreeFadeIntoEachOtherWithoutAJump) {
+  // Both windows move evenly, 6 cm apart; they share three frames, so that each step of the fade is a quarter of that.
+  const geometry::Template model = LimbTemplate(0);
+  constexpr double kApart = 0.06;
+  constexpr double kSpeed = 0.02;
+  std::vector<PoseTrack> windows{ConstantTrack(model, {0, 1, 2, 3, 4, 5, 6, 7, 8, 9}, {}),
+                                 ConstantTrack(model, {7, 8, 9, 10, 11, 12, 13, 14, 15, 16}, {})};
+  for (std::size_t w = 0; w < 2; ++w) {
+    for (std::size_t f = 0; f < 10; ++f) {
+      for (std::int32_t k = 0; k < model.patch_count; ++k) {
+        windows[w].Pose(f, k).translation.x() = kSpeed * windows[w].frames[f] + kApart * static_cast<double>(w);
+      }
+    }
+  }
+  AssembleOptions options;
+  for (std::int32_t f = 0; f < 17; ++f) options.frames.push_back(f);
+  const auto take = Assemble(model, windows, options);
+  ASSERT_TRUE(take.ok()) << take.status();
+  double total = 0;
+  for (std::size_t f = 1; f < 17; ++f) {
+    const double step = take->CellPose(f, 0).translation.x() - take->CellPose(f - 1, 0).translation.x() - kSpeed;
+    EXPECT_GT(step, -1e-9) << f;
+    EXPECT_LT(step, kApart / 4 + 1e-9) << f;
+    total += step;
+  }
+  EXPECT_NEAR(total, kApart, 1e-9);
+}
+
 }  // namespace
 }  // namespace vorocast::tracking
