@@ -21,6 +21,8 @@ Vec3f Metal() { return {0.46F, 0.47F, 0.49F}; }
 /// The skin stands out from the cut faces within.
 constexpr float kSkinWhite = 0.10F;
 constexpr float kCutDark = 0.72F;
+/// Copies stand back behind the performer.
+constexpr float kCopyWhite = 0.45F;
 
 bool IsDrawn(const CellsPicture& picture, std::size_t cell) { return picture.state.empty() || picture.state[cell] != CellState::kGone; }
 
@@ -40,23 +42,35 @@ std::span<const std::int32_t> FaceLoop(const Cells& cells, std::int64_t face) {
   return {cells.vertex.data() + begin, end - begin};
 }
 
-void AppendCell(const CellsPicture& picture, std::size_t cell, double shrink, Triangles& mesh) {
-  const Cells& cells = *picture.cells;
-  const Rigid3 pose = PoseOf(picture, cell);
-  const Vec3f colour = ColourOf(picture, cell);
+/// How a cell is drawn beside its shape.
+struct Look {
+  Rigid3 pose;
+  Vec3f colour;
+  double scale;
+};
+
+void AppendCell(const Cells& cells, std::size_t cell, const Look& look, Triangles& mesh) {
+  const auto& [pose, colour, scale] = look;
   const Vec3 centroid = cells.centroid[cell];
-  if (!picture.scale.empty()) shrink *= picture.scale[cell];
   std::vector<Vec3> corners;
   for (std::int64_t face = cells.face_offset[cell]; face < cells.face_offset[cell + 1]; ++face) {
     corners.clear();
     for (std::int32_t v : FaceLoop(cells, face))
-      corners.push_back(pose * (centroid + shrink * (cells.vertices[static_cast<std::size_t>(v)] - centroid)));
+      corners.push_back(pose * (centroid + scale * (cells.vertices[static_cast<std::size_t>(v)] - centroid)));
     const bool is_skin = cells.neighbour[static_cast<std::size_t>(face)] < 0;
     const Vec3f tint = is_skin ? Vec3f((1 - kSkinWhite) * colour + Vec3f::Constant(kSkinWhite)) : Vec3f(kCutDark * colour);
     for (const auto& triangle : geometry::Triangulate(corners)) {
       for (std::int32_t i : triangle) mesh.corners.push_back(corners[static_cast<std::size_t>(i)].cast<float>());
       mesh.colours.push_back(tint);
     }
+  }
+}
+
+void AppendShape(const LooseShape& shape, const Vec3f& colour, double shrink, Triangles& mesh) {
+  for (const auto& triangle : shape.mesh.triangles) {
+    for (const std::int32_t v : triangle)
+      mesh.corners.push_back((shape.middle + shrink * shape.mesh.vertices[static_cast<std::size_t>(v)]).cast<float>());
+    mesh.colours.push_back(colour);
   }
 }
 
@@ -75,8 +89,16 @@ Triangles MakeObject(const geometry::TriangleMesh& object, const Rigid3& world_f
 std::vector<Triangles> MakeMeshes(const CellsPicture& picture, double shrink) {
   std::vector<Triangles> meshes(1);
   for (std::size_t cell = 0; cell < picture.cells->size(); ++cell) {
-    if (IsDrawn(picture, cell)) AppendCell(picture, cell, shrink, meshes[0]);
+    if (!IsDrawn(picture, cell)) continue;
+    const double scale = picture.scale.empty() ? 1 : picture.scale[cell];
+    AppendCell(*picture.cells, cell, {PoseOf(picture, cell), ColourOf(picture, cell), shrink * scale}, meshes[0]);
   }
+  for (const CellCopy& copy : picture.copies) {
+    const auto cell = static_cast<std::size_t>(copy.cell);
+    const Vec3f pale = (1 - kCopyWhite) * ColourOf(picture, cell) + Vec3f::Constant(kCopyWhite);
+    AppendCell(*picture.cells, cell, {copy.world_from_template, pale, shrink * copy.scale}, meshes[0]);
+  }
+  for (const LooseShape& shape : picture.shapes) AppendShape(shape, ColourOf(picture, static_cast<std::size_t>(shape.colour_of)), shrink, meshes[0]);
   for (const auto& [object, world_from_object] : picture.objects) meshes.push_back(MakeObject(*object, world_from_object));
   return meshes;
 }
@@ -94,6 +116,14 @@ absl::Status CheckPicture(const CellsPicture& picture) {
     return absl::InvalidArgumentError(fmt::format("{} cells have {} states", n, picture.state.size()));
   if (!picture.scale.empty() && picture.scale.size() != n)
     return absl::InvalidArgumentError(fmt::format("{} cells have {} scales", n, picture.scale.size()));
+  for (const CellCopy& copy : picture.copies) {
+    if (copy.cell < 0 || static_cast<std::size_t>(copy.cell) >= n)
+      return absl::InvalidArgumentError(fmt::format("a copy of cell {} of {}", copy.cell, n));
+  }
+  for (const LooseShape& shape : picture.shapes) {
+    if (shape.colour_of < 0 || static_cast<std::size_t>(shape.colour_of) >= n)
+      return absl::InvalidArgumentError(fmt::format("a shape with the colour of cell {} of {}", shape.colour_of, n));
+  }
   for (std::size_t cell = 0; cell < picture.world_from_template.size(); ++cell) {
     const Rigid3& pose = picture.world_from_template[cell];
     if (!pose.translation.allFinite() || !pose.rotation.coeffs().allFinite()) {
@@ -114,6 +144,15 @@ void AddBounds(const CellsPicture& picture, Bounds& bounds) {
     }
     bounds.centres.push_back((PoseOf(picture, cell) * cells.centroid[cell]).cast<float>());
     bounds.radii.push_back(static_cast<float>(std::sqrt(squared)));
+  }
+  for (const CellCopy& copy : picture.copies) {
+    const auto cell = static_cast<std::size_t>(copy.cell);
+    bounds.centres.push_back((copy.world_from_template * cells.centroid[cell]).cast<float>());
+    bounds.radii.push_back(0.01F);
+  }
+  for (const LooseShape& shape : picture.shapes) {
+    bounds.centres.push_back(shape.middle.cast<float>());
+    bounds.radii.push_back(0.01F);
   }
   for (const auto& [object, world_from_object] : picture.objects) {
     for (const Vec3& v : object->vertices) bounds.companions.push_back((world_from_object * v).cast<float>());

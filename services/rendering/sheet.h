@@ -29,6 +29,18 @@ struct PointsPicture {
   geometry::OrientedPoints points;
   std::string label;
 };
+/// A cell that is drawn once more, paler.
+struct CellCopy {
+  std::int32_t cell = 0;  // whose shape it has
+  geometry::Rigid3 world_from_template;
+  float scale = 1;  // size about the centroid
+};
+/// A polyhedron that is no template cell any more.
+struct LooseShape {
+  geometry::TriangleMesh mesh;  // in the world, about its middle
+  geometry::Vec3 middle;
+  std::int32_t colour_of = 0;  // the cell whose colour it has
+};
 /// Cells in some pose, slightly shrunk towards their centroids, coloured by patch (or by cell where patch is empty); cut faces darker.
 struct CellsPicture {
   const geometry::Cells* cells = nullptr;
@@ -36,6 +48,8 @@ struct CellsPicture {
   std::vector<geometry::Rigid3> world_from_template;  // [n], or empty for the identity
   std::vector<geometry::CellState> state;             // [n], or empty: kGone cells are not drawn
   std::vector<float> scale;                           // [n] size about the centroid, or empty: as they are
+  std::vector<CellCopy> copies;
+  std::vector<LooseShape> shapes;
   std::vector<std::pair<const geometry::TriangleMesh*, geometry::Rigid3>> objects;
   std::string label;
 };

@@ -78,21 +78,6 @@ Hull MakeHull(const std::vector<Vec3>& corners, double shrink) {
   return hull;
 }
 
-/// At most kHullCorners of the corners, spread out: each next one is the farthest from those chosen.
-std::vector<Vec3> ThinOut(const std::vector<Vec3>& corners) {
-  if (corners.size() <= kHullCorners) return corners;
-  std::vector<Vec3> chosen;
-  std::vector<double> distance(corners.size(), std::numeric_limits<double>::max());
-  const auto farther = [](const Vec3& a, const Vec3& b) { return a.squaredNorm() < b.squaredNorm(); };
-  auto next = static_cast<std::size_t>(std::ranges::max_element(corners, farther) - corners.begin());
-  while (chosen.size() < kHullCorners) {
-    chosen.push_back(corners[next]);
-    for (std::size_t i = 0; i < corners.size(); ++i) distance[i] = std::min(distance[i], (corners[i] - chosen.back()).squaredNorm());
-    next = static_cast<std::size_t>(std::ranges::max_element(distance) - distance.begin());
-  }
-  return chosen;
-}
-
 /// Largest coordinate minus smallest along each axis.
 Vec3 Extent(const std::vector<Vec3>& points) {
   geometry::Box3 box;
@@ -144,7 +129,7 @@ CellShape MakeCellShape(const Cells& cells, std::size_t c, double mass, double s
   CellShape shape;
   const PrincipalAxes axes = Diagonalise(whole.covariance);
   shape.cell_from_body = axes.cell_from_body;
-  for (const Vec3& corner : ThinOut(shrunk.corners)) shape.hull.push_back(shape.cell_from_body.conjugate() * corner);
+  for (const Vec3& corner : ThinOutCorners(shrunk.corners)) shape.hull.push_back(shape.cell_from_body.conjugate() * corner);
   for (const Vec3& corner : shrunk.corners) shape.all_corners.push_back(shape.cell_from_body.conjugate() * corner);
   if (Extent(shape.hull).minCoeff() < kExtentMin) return BoxInstead(corners, mass, shrink);
   shape.mass = mass;
@@ -153,6 +138,20 @@ CellShape MakeCellShape(const Cells& cells, std::size_t c, double mass, double s
 }
 
 }  // namespace
+
+std::vector<Vec3> ThinOutCorners(const std::vector<Vec3>& corners) {
+  if (corners.size() <= kHullCorners) return corners;
+  std::vector<Vec3> chosen;
+  std::vector<double> distance(corners.size(), std::numeric_limits<double>::max());
+  const auto farther = [](const Vec3& a, const Vec3& b) { return a.squaredNorm() < b.squaredNorm(); };
+  auto next = static_cast<std::size_t>(std::ranges::max_element(corners, farther) - corners.begin());
+  while (chosen.size() < kHullCorners) {
+    chosen.push_back(corners[next]);
+    for (std::size_t i = 0; i < corners.size(); ++i) distance[i] = std::min(distance[i], (corners[i] - chosen.back()).squaredNorm());
+    next = static_cast<std::size_t>(std::ranges::max_element(distance) - distance.begin());
+  }
+  return chosen;
+}
 
 std::vector<CellShape> MakeCellShapes(const Cells& cells, const CellSettings& settings) {
   const double shrink = kHullMargin + settings.shrink_m;

@@ -29,4 +29,7 @@ struct CellShape {
 /// Flat, tiny and empty cells get a small box of at least a millimetre instead; masses have a floor of a hundredth of the mean.
 std::vector<CellShape> MakeCellShapes(const geometry::Cells& cells, const CellSettings& settings);
 
+/// At most kHullCorners of the corners, spread out: each next one is the farthest from those chosen.
+std::vector<geometry::Vec3> ThinOutCorners(const std::vector<geometry::Vec3>& corners);
+
 }  // namespace vorocast::simulation

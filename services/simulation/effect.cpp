@@ -11,6 +11,7 @@
 #include "services/base/check.h"
 #include "services/simulation/effect_settings.h"
 #include "services/simulation/json_schema.h"
+#include "services/simulation/mesh_file.h"
 #include "services/simulation/shipped_effects.h"
 
 namespace vorocast::simulation {
@@ -18,7 +19,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::uintmax_t kLargestFile = 1 << 20;
+constexpr std::uintmax_t kLargestFile = 2 << 20;  // with the meshes that it carries
 
 absl::StatusOr<std::string> ReadText(const std::filesystem::path& path) {
   std::error_code error;
@@ -30,6 +31,22 @@ absl::StatusOr<std::string> ReadText(const std::filesystem::path& path) {
   std::string text{std::istreambuf_iterator<char>(file), {}};
   if (!file) return absl::UnavailableError(fmt::format("effect file {}: cannot be read", path.string()));
   return text;
+}
+
+absl::StatusOr<json> ParseJson(std::string_view text) {
+  if (text.size() > kLargestFile)
+    return absl::InvalidArgumentError(fmt::format("effect: {} bytes, an effect has at most {}", text.size(), kLargestFile));
+  try {
+    return json::parse(text);
+  } catch (const json::exception& error) {
+    return absl::InvalidArgumentError(fmt::format("effect: not valid JSON: {}", error.what()));
+  }
+}
+
+absl::StatusOr<json> ParseEffectFile(std::string_view text, const std::filesystem::path& path) {
+  ASSIGN_OR_RETURN(json effect, ParseJson(text));
+  RETURN_IF_ERROR(EmbedMeshFiles(effect, path.parent_path()));
+  return NormaliseEffect(effect);
 }
 
 }  // namespace
@@ -48,14 +65,7 @@ absl::StatusOr<json> NormaliseEffect(const json& effect) {
 }
 
 absl::StatusOr<json> ParseEffect(std::string_view text) {
-  if (text.size() > kLargestFile)
-    return absl::InvalidArgumentError(fmt::format("effect: {} bytes, an effect has at most {}", text.size(), kLargestFile));
-  json effect;
-  try {
-    effect = json::parse(text);
-  } catch (const json::exception& error) {
-    return absl::InvalidArgumentError(fmt::format("effect: not valid JSON: {}", error.what()));
-  }
+  ASSIGN_OR_RETURN(const json effect, ParseJson(text));
   return NormaliseEffect(effect);
 }
 
@@ -69,7 +79,7 @@ absl::StatusOr<json> LoadEffect(const std::string& name_or_path) {
         fmt::format("effect \"{}\": no such file, and none of the shipped effects ({})", name_or_path, fmt::join(ShippedEffects(), ", ")));
   }
   ASSIGN_OR_RETURN(const std::string text, ReadText(name_or_path));
-  auto effect = ParseEffect(text);
+  auto effect = ParseEffectFile(text, name_or_path);
   if (!effect.ok()) return base::Annotate(effect.status(), name_or_path);
   return effect;
 }

@@ -14,10 +14,10 @@
 /// what it may hold. The typed form that the simulation works with is services/simulation/effect_settings.h.
 namespace vorocast::simulation {
 
-/// The names of the shipped effects, sorted ("calm", "pendulum", "release").
+/// The names of the shipped effects, sorted ("calm", "erosion", …).
 std::vector<std::string> ShippedEffects();
-/// `name_or_path`: a shipped name or a JSON file. Returns the whole effect as canonical JSON, defaults filled in.
-/// NOT_FOUND when it is neither, with the names that ship.
+/// `name_or_path`: a shipped name or a JSON file, whose meshes are read from beside it (mesh_file.h). Returns the whole effect as canonical JSON,
+/// defaults filled in. NOT_FOUND when it is neither, with the names that ship.
 absl::StatusOr<nlohmann::json> LoadEffect(const std::string& name_or_path);
 /// The same for JSON already read. What a client sends passes through here before it is believed.
 absl::StatusOr<nlohmann::json> NormaliseEffect(const nlohmann::json& effect);

@@ -9,7 +9,15 @@
 #include <nlohmann/json.hpp>
 
 #include "services/base/status.h"
+#include "services/geometry/triangle_mesh.h"
 #include "services/geometry/vector.h"
+#include "services/simulation/bonds.h"
+#include "services/simulation/distortion.h"
+#include "services/simulation/force_fields.h"
+#include "services/simulation/key_framed.h"
+#include "services/simulation/mask.h"
+#include "services/simulation/morph.h"
+#include "services/simulation/persistence.h"
 
 /// A whole effect in types. Every member is a field of effects/effect.schema.json, whose descriptions hold; what the file writes as a
 /// word ("take", "auto", "lowest", "never") is an empty optional here.
@@ -27,10 +35,17 @@ struct GroundSettings {
 };
 
 struct RecallSettings {
-  double stiffness_s2 = 1000;
-  double damping_ratio = 1;
-  double angular_stiffness_s2 = 1000;
-  double angular_damping_ratio = 1;
+  Scalar stiffness_s2 = 1000;
+  Scalar damping_ratio = 1;
+  Scalar angular_stiffness_s2 = 1000;
+  Scalar angular_damping_ratio = 1;
+  Scalar weight_carried = 1;
+  MaskSettings mask;
+};
+
+struct RuptureSettings {
+  std::optional<Scalar> acceleration_m_s2;
+  MaskSettings mask;
 };
 
 struct CellSettings {
@@ -46,12 +61,36 @@ struct ReleaseByHeight {
   double share = 1;
 };
 
-/// What a box and a sphere have in common.
+struct ReleaseByDepth {
+  bool from_outside = true;
+  double start_s = 0;
+  Scalar speed_m_s = 0.05;
+};
+
+struct ReleaseByHeat {
+  double start_s = 0;
+  MaskSettings source;
+  bool held = false;
+  bool geometric = false;
+  Scalar rate_s = 20;
+  double threshold = 0.02;
+};
+
+struct ReleaseRule {
+  bool vanish = false;
+  double vanish_s = 0.2;
+  MaskSettings mask;
+  std::variant<ReleaseByHeight, ReleaseByDepth, ReleaseByHeat> by;
+};
+
+/// What boxes, spheres and meshes have in common.
 struct Placement {
+  enum class Motion : std::uint8_t { kLoose, kFixed, kDriven };
   std::string name;
-  geometry::Vec3 position_m = geometry::Vec3::Zero();
+  Vector position_m = geometry::Vec3(geometry::Vec3::Zero());
+  Vector rotation_deg = geometry::Vec3(geometry::Vec3::Zero());
   bool origin_is_take = true;
-  bool fixed = false;
+  Motion motion = Motion::kLoose;
   double mass_kg = 50;
   geometry::Vec3 velocity_m_s = geometry::Vec3::Zero();
   double start_s = 0;
@@ -61,12 +100,17 @@ struct Placement {
 struct BoxSettings {
   Placement placement;
   geometry::Vec3 size_m = geometry::Vec3::Constant(0.3);
-  geometry::Vec3 rotation_deg = geometry::Vec3::Zero();
 };
 
 struct SphereSettings {
   Placement placement;
   double radius_m = 0.15;
+};
+
+struct MeshSettings {
+  Placement placement;
+  double scale = 1;
+  geometry::TriangleMesh mesh;  // before scaling
 };
 
 struct PendulumSettings {
@@ -84,7 +128,7 @@ struct PendulumSettings {
   Surface surface;
 };
 
-using ObjectSettings = std::variant<BoxSettings, SphereSettings, PendulumSettings>;
+using ObjectSettings = std::variant<BoxSettings, SphereSettings, MeshSettings, PendulumSettings>;
 
 struct Effect {
   std::string name;
@@ -93,17 +137,22 @@ struct Effect {
   double duration_min_s = 0;
   std::optional<double> output_fps;
   double rate_hz = 240;
-  double gravity_m_s2 = 9.81;
+  Scalar gravity_m_s2 = 9.81;
   GroundSettings ground;
   RecallSettings recall;
-  std::optional<double> rupture_acceleration_m_s2;
-  std::vector<ReleaseByHeight> release;
+  RuptureSettings rupture;
+  std::vector<ReleaseRule> release;
+  std::vector<FieldSettings> fields;
+  std::vector<DistortionSettings> distortion;
+  BondSettings bonds;
+  std::vector<PersistenceSettings> persistence;
+  std::optional<MorphSettings> morph;
   CellSettings cells;
   std::vector<ObjectSettings> objects;
 };
 
 /// The typed form of canonical JSON (what NormaliseEffect returns). INVALID_ARGUMENT for what no single field shows to be wrong: a
-/// release that ends before it starts, two objects of one name.
+/// release that ends before it starts, two objects of one name, a mesh whose triangles name corners that are not there.
 /// Every field of the schema is read here and nothing else: that both know the same fields is checked.
 absl::StatusOr<Effect> EffectFromCanonicalJson(const nlohmann::json& effect);
 

@@ -31,6 +31,7 @@ class Checker {
   absl::StatusOr<json> Check(const json& schema_or_ref, const json& value, const std::string& path) const {
     const json& schema = Resolve(schema_or_ref);
     if (schema.contains("oneOf")) return CheckTagged(schema, value, path);
+    if (IsKeyFramed(schema)) return CheckKeyFramed(schema, value, path);
     if (schema.contains("anyOf")) return CheckWordOr(schema, value, path);
     if (schema.contains("const")) return value == schema["const"] ? absl::StatusOr<json>(value) : Wrong(schema, value, path);
     if (schema.contains("enum")) return CheckEnum(schema, value, path);
@@ -38,6 +39,7 @@ class Checker {
     if (type == "object") return CheckObject(schema, value, path);
     if (type == "array") return CheckArray(schema, value, path);
     if (type == "number") return CheckNumber(schema, value, path);
+    if (type == "integer") return CheckInteger(schema, value, path);
     if (type == "string") return CheckString(schema, value, path);
     VOROCAST_CHECK(type == "boolean");
     return value.is_boolean() ? absl::StatusOr<json>(value) : Wrong(schema, value, path);
@@ -45,9 +47,17 @@ class Checker {
 
  private:
   const json& Resolve(const json& schema) const {
+    // "allOf" around a reference is how draft-07 gives one a default of its own.
+    if (const auto all = schema.find("allOf"); all != schema.end()) return Resolve(all->at(0));
     const auto ref = schema.find("$ref");
     if (ref == schema.end()) return schema;
     return root_.at(json::json_pointer(ref->get<std::string>().substr(1)));
+  }
+  /// What a property is when it is left out, or null when it must not be.
+  const json* Default(const json& property) const {
+    const json& owner = property.contains("allOf") ? property : Resolve(property);
+    const auto found = owner.find("default");
+    return found == owner.end() ? nullptr : &*found;
   }
 
   absl::Status Error(const std::string& path, const std::string& text) const {
@@ -62,6 +72,7 @@ class Checker {
     const json& schema = Resolve(schema_or_ref);
     if (schema.contains("const")) return Show(schema["const"]);
     if (schema.contains("enum")) return fmt::format("one of {}", Join(schema["enum"].get<std::vector<std::string>>()));
+    if (IsKeyFramed(schema)) return fmt::format("{} or a list of key frames", Describe(schema["anyOf"][0]));
     if (schema.contains("anyOf")) return fmt::format("{} or {}", Describe(schema["anyOf"][0]), Describe(schema["anyOf"][1]));
     if (schema.contains("oneOf")) return fmt::format("an object whose {} is one of {}", TagName(schema), Join(TagValues(schema)));
     const std::string type = schema.at("type");
@@ -76,6 +87,8 @@ class Checker {
     if (schema.contains("exclusiveMinimum")) {
       return fmt::format("a number above {} and up to {}", schema["exclusiveMinimum"].get<double>(), schema.at("maximum").get<double>());
     }
+    if (type == "integer")
+      return fmt::format("a whole number from {} to {}", schema.at("minimum").get<std::int64_t>(), schema.at("maximum").get<std::int64_t>());
     return fmt::format("a number from {} to {}", schema.at("minimum").get<double>(), schema.at("maximum").get<double>());
   }
 
@@ -86,6 +99,14 @@ class Checker {
         schema.contains("exclusiveMinimum") ? number > schema["exclusiveMinimum"].get<double>() : number >= schema.at("minimum").get<double>();
     if (!above || !(number <= schema.at("maximum").get<double>())) return Wrong(schema, value, path);
     return json(number == 0 ? 0.0 : number);  // −0 and 0 are one effect, and have one key.
+  }
+
+  absl::StatusOr<json> CheckInteger(const json& schema, const json& value, const std::string& path) const {
+    if (!value.is_number_integer()) return Wrong(schema, value, path);
+    // Compared as a real number first: an unsigned number may not fit a signed one.
+    const auto number = value.get<double>();
+    if (!(number >= schema.at("minimum").get<double>()) || !(number <= schema.at("maximum").get<double>())) return Wrong(schema, value, path);
+    return json(value.get<std::int64_t>());
   }
 
   absl::StatusOr<json> CheckString(const json& schema, const json& value, const std::string& path) const {
@@ -129,13 +150,34 @@ class Checker {
     }
     json result = json::object();
     for (const auto& [key, property] : properties.items()) {
-      const json& resolved = Resolve(property);
+      const json* fallback = Default(property);
       const auto found = value.find(key);
-      if (found == value.end() && !resolved.contains("default")) return Error(below(key), fmt::format("missing; it must be {}", Describe(resolved)));
-      ASSIGN_OR_RETURN(json field, Check(resolved, found == value.end() ? resolved["default"] : *found, below(key)));
+      if (found == value.end() && fallback == nullptr) return Error(below(key), fmt::format("missing; it must be {}", Describe(property)));
+      ASSIGN_OR_RETURN(json field, Check(property, found == value.end() ? *fallback : *found, below(key)));
       result[key] = std::move(field);
     }
     return result;
+  }
+
+  /// anyOf of a number or a point, and key frames of it.
+  bool IsKeyFramed(const json& schema) const { return schema.contains("anyOf") && !Resolve(schema["anyOf"][0]).contains("const"); }
+  absl::StatusOr<json> CheckKeyFramed(const json& schema, const json& value, const std::string& path) const {
+    const json& plain = schema["anyOf"][0];
+    const bool has_keys = value.is_array() && !value.empty() && value[0].is_object();
+    if (!has_keys) {
+      auto constant = Check(plain, value, path);
+      const bool is_point = value.is_array() && Resolve(plain).at("type") == "array";
+      return constant.ok() || is_point ? constant : Wrong(schema, value, path);
+    }
+    ASSIGN_OR_RETURN(json keys, Check(schema["anyOf"][1], value, path));
+    for (std::size_t i = 0; i < keys.size(); ++i) {
+      const std::string key_path = fmt::format("{}[{}]", path, i);
+      ASSIGN_OR_RETURN(keys[i]["value"], Check(plain, value[i]["value"], key_path + ".value"));
+      if (i > 0 && !(keys[i]["t"] > keys[i - 1]["t"])) {
+        return Error(key_path + ".t", fmt::format("{} is not later than the key frame before, {}", Show(keys[i]["t"]), Show(keys[i - 1]["t"])));
+      }
+    }
+    return keys;
   }
 
   /// anyOf of a word and something else: "auto" or a number.
@@ -144,9 +186,10 @@ class Checker {
     const json& word = Resolve(schema["anyOf"][0]).at("const");
     if (value == word) return value;
     // A list is meant as the list: its own message tells more.
-    if (value.is_string() || value.is_object()) return Wrong(schema, value, path);
+    const bool other_is_object = Resolve(schema["anyOf"][1]).value("type", "") == "object";
+    if (value.is_string() || value.is_object() != other_is_object) return Wrong(schema, value, path);
     auto other = Check(schema["anyOf"][1], value, path);
-    if (!other.ok() && !value.is_array()) return Wrong(schema, value, path);
+    if (!other.ok() && !value.is_array() && !other_is_object) return Wrong(schema, value, path);
     return other;
   }
 

@@ -18,6 +18,7 @@
 #include "services/rpc/server.h"
 #include "services/simulation/simulate_executor.h"
 #include "services/simulation/simulation_service.h"
+#include "services/simulation/try_effect.h"
 
 namespace {
 
@@ -72,7 +73,7 @@ int main(int argc, char** argv) {
   base::RequireProcessor();
   CLI::App app(kStory, "vorocast-simulation");
   Options options;
-  app.add_option("--scheduler", options.lease.scheduler, "Takes tasks from here: HOST:PORT or unix:/PATH")->envname("VOROCAST_SCHEDULER");
+  app.add_option("--scheduler", options.lease.scheduler, "Takes tasks from here: HOST:PORT or unix:/PATH; A,B where one stands by")->envname("VOROCAST_SCHEDULER");
   CLI::Option* listen =
       app.add_option("--listen", options.listen, "Answers gRPC here: HOST:PORT, port 0 for any free one, or unix:/PATH. The address is printed");
   CLI::Option* store = app.add_option("--store", options.store, "The artifact folder for runs asked for over --listen");
@@ -80,12 +81,27 @@ int main(int argc, char** argv) {
   lease::LeaseFlags flags;
   flags.AddTo(app, options.lease, "Simulations at once, from each side");
   CLI::App* execute_task = app.add_subcommand("execute-task", "Runs one task given on standard input; the program starts this itself");
+  CLI::App* try_effect = app.add_subcommand("try", "Runs one effect on a tracked.h5 at once, without a scheduler");
+  simulation::TryOptions trial;
+  try_effect->add_option("tracked", trial.tracked, "The tracked take")->required()->check(CLI::ExistingFile);
+  try_effect->add_option("--effect", trial.effect, "A shipped effect's name or a JSON file (docs/effects.md)")->required();
+  try_effect->add_option("--onto", trial.onto, "The second tracked.h5, which a morph turns the first into")->check(CLI::ExistingFile);
+  try_effect->add_option("--out", trial.out, "Writes simulated.h5 here");
+  try_effect->add_option("--sheet", trial.sheet, "Writes a contact sheet (PNG) here");
+  try_effect->add_option("--pictures", trial.pictures, "On the sheet")->check(CLI::Range(1, 200))->capture_default_str();
+  try_effect->add_option("--from", trial.from_s, "Time of the sheet's first picture, seconds")->capture_default_str();
+  try_effect->add_option("--width", trial.width, "Of a picture, pixels")->check(CLI::Range(16, 4096))->capture_default_str();
   CLI11_PARSE(app, argc, argv);
 
   if (execute_task->parsed()) {
     std::vector<std::unique_ptr<lease::Executor>> executors;
     executors.push_back(std::make_unique<simulation::SimulateExecutor>());
     return lease::ExecuteTaskMain(executors);
+  }
+  if (try_effect->parsed()) {
+    const absl::Status status = simulation::TryEffect(trial);
+    if (!status.ok()) fmt::print(stderr, "vorocast-simulation: {}\n", std::string(status.message()));
+    return status.ok() ? EXIT_SUCCESS : EXIT_FAILURE;
   }
   if (options.lease.scheduler.empty() && options.listen.empty()) {
     fmt::print(stderr, "vorocast-simulation: nothing to do; give --scheduler, --listen, or both\n");

@@ -184,6 +184,15 @@ void NearPairBroadphase::FillGrid() {
   }
 }
 
+bool NearPairBroadphase::ArePartners(const btBroadphaseProxy& a, const btBroadphaseProxy& b) const {
+  if (partners_ == nullptr || partners_->empty()) return false;
+  const int index_a = static_cast<const btCollisionObject*>(a.m_clientObject)->getUserIndex();
+  const int index_b = static_cast<const btCollisionObject*>(b.m_clientObject)->getUserIndex();
+  if (index_a < 0 || index_b < 0) return false;
+  const std::vector<std::int32_t>& partners = (*partners_)[static_cast<std::size_t>(index_a)];
+  return std::ranges::find(partners, index_b) != partners.end();
+}
+
 /// Later proxies that the given one may touch, ascending.
 void NearPairBroadphase::FindNeighbours(std::int32_t order, std::vector<std::int32_t>& neighbours) const {
   neighbours.clear();
@@ -191,7 +200,7 @@ void NearPairBroadphase::FindNeighbours(std::int32_t order, std::vector<std::int
   const Proxy& proxy = *proxies_[static_cast<std::size_t>(order)];
   const auto try_box = [&](std::int32_t other) {
     const Proxy& other_proxy = *proxies_[static_cast<std::size_t>(other)];
-    if (FilterLets(proxy, other_proxy) && BoxesMeet(proxy, other_proxy)) neighbours.push_back(other);
+    if (FilterLets(proxy, other_proxy) && BoxesMeet(proxy, other_proxy) && !ArePartners(proxy, other_proxy)) neighbours.push_back(other);
   };
   if (!own.gridded) {
     for (auto other = order + 1; other < static_cast<std::int32_t>(entries_.size()); ++other) try_box(other);

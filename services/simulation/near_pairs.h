@@ -46,6 +46,8 @@ class PairList : public btOverlappingPairCache {
 /// leaf moves at every step. The few other bodies (scene objects, the ground, cells far larger than the rest) are tried against everything.
 class NearPairBroadphase : public btBroadphaseInterface {
  public:
+  /// Bodies whose user indices are partners ([n] lists) are never near each other.
+  void LetPartnersOverlap(const std::vector<std::vector<std::int32_t>>* partners) { partners_ = partners; }
   btBroadphaseProxy* createProxy(const btVector3& aabb_min, const btVector3& aabb_max, int shape_type, void* object, int group, int mask,
                                  btDispatcher* dispatcher) override;
   void destroyProxy(btBroadphaseProxy* proxy, btDispatcher* dispatcher) override;
@@ -73,8 +75,10 @@ class NearPairBroadphase : public btBroadphaseInterface {
   };
 
   void FillGrid();
+  bool ArePartners(const btBroadphaseProxy& a, const btBroadphaseProxy& b) const;
   void FindNeighbours(std::int32_t order, std::vector<std::int32_t>& neighbours) const;
 
+  const std::vector<std::vector<std::int32_t>>* partners_ = nullptr;
   PairList pairs_;
   std::deque<Proxy> pool_;  // proxies never move
   std::vector<Proxy*> free_;

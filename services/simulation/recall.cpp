@@ -34,7 +34,7 @@ Quat FromRotationVector(const Vec3& vector) {
 RecallStep Recall(const Spring& linear, const Spring& angular, const RecallInput& input, double dt) {
   const Vec3 deviation = input.body.position - input.target.translation;
   const Vec3 deviation_velocity = input.body.velocity - input.target_velocity;
-  const Vec3 next_velocity = NextDeviationVelocity(linear, deviation, deviation_velocity, dt);
+  const Vec3 next_velocity = NextDeviationVelocity(linear, deviation, deviation_velocity + dt * input.acceleration, dt);
 
   const Vec3 turn = RotationVector(input.body.rotation * input.target.rotation.conjugate());
   const Vec3 turn_velocity = input.body.angular_velocity - input.target_angular_velocity;

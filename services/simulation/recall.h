@@ -51,6 +51,7 @@ struct RecallInput {
   geometry::Rigid3 next_target;
   geometry::Vec3 target_velocity = geometry::Vec3::Zero();
   geometry::Vec3 target_angular_velocity = geometry::Vec3::Zero();
+  geometry::Vec3 acceleration = geometry::Vec3::Zero();  // of everything else that acts on the body
 };
 RecallStep Recall(const Spring& linear, const Spring& angular, const RecallInput& input, double dt);
 

@@ -8,7 +8,14 @@
 
 namespace vorocast::simulation {
 
-/// When each cell is let go (paper, section 6.1, asynchronous deactivation): seconds from the first frame, infinity for never. [n]
-std::vector<double> ScheduleRelease(const TrackedMotion& motion, const std::vector<ReleaseByHeight>& rules);
+/// When each cell goes (paper, section 6.1, asynchronous deactivation): seconds from the first frame, infinity for never. [n]
+struct ReleaseSchedule {
+  std::vector<double> release;
+  std::vector<double> vanish;    // when it begins to shrink
+  std::vector<double> vanish_s;  // how long that takes
+};
+
+/// `duration_s`: what comes later is not looked for.
+ReleaseSchedule ScheduleRelease(const TrackedMotion& motion, const MaskSubject& subject, const std::vector<ReleaseRule>& rules, double duration_s);
 
 }  // namespace vorocast::simulation

@@ -78,15 +78,28 @@ Vec3 TakeOrigin(const std::vector<Rigid3>& first_pose, double ground) {
   return {box.center().x(), ground, box.center().z()};
 }
 
-SceneBody Place(const Placement& placement, const Vec3& origin) {
+/// About x, then y, then z.
+Quat Turned(const Vec3& degrees) {
+  return TurnAbout(Vec3::UnitZ(), Radians(degrees.z())) * TurnAbout(Vec3::UnitY(), Radians(degrees.y())) *
+         TurnAbout(Vec3::UnitX(), Radians(degrees.x()));
+}
+
+SceneBody Place(const Placement& placement, const Vec3& take_origin) {
+  using Motion = Placement::Motion;
   SceneBody body;
   body.name = placement.name;
-  body.motion = placement.fixed ? SceneBody::Motion::kFixed : SceneBody::Motion::kLoose;
+  body.motion = placement.motion == Motion::kFixed   ? SceneBody::Motion::kFixed
+                : placement.motion == Motion::kLoose ? SceneBody::Motion::kLoose
+                                                     : SceneBody::Motion::kDriven;
   body.mass = placement.mass_kg;
   body.surface = placement.surface;
-  body.start.position = placement.position_m + (placement.origin_is_take ? origin : Vec3(Vec3::Zero()));
+  std::vector<Vector::Key> keys = placement.position_m.keys();
+  for (Vector::Key& key : keys) key.value += placement.origin_is_take ? take_origin : Vec3(Vec3::Zero());
+  body.start.position = keys.front().value;
+  body.start.rotation = Turned(placement.rotation_deg.keys().front().value);
   body.start.velocity = placement.velocity_m_s;
   body.start_s = placement.start_s;
+  if (placement.motion == Motion::kDriven) body.path = SceneBody::Path{.position = Vector(std::move(keys)), .rotation_deg = placement.rotation_deg};
   return body;
 }
 
@@ -98,9 +111,6 @@ class Placer {
 
   absl::StatusOr<SceneBody> operator()(const BoxSettings& box) const {
     SceneBody body = Place(box.placement, origin_);
-    const Vec3 turn = box.rotation_deg;
-    body.start.rotation =
-        TurnAbout(Vec3::UnitZ(), Radians(turn.z())) * TurnAbout(Vec3::UnitY(), Radians(turn.y())) * TurnAbout(Vec3::UnitX(), Radians(turn.x()));
     body.box_half = 0.5 * box.size_m;
     body.mesh = BoxMesh(*body.box_half);
     return body;
@@ -113,10 +123,19 @@ class Placer {
     return body;
   }
 
+  absl::StatusOr<SceneBody> operator()(const MeshSettings& mesh) const {
+    SceneBody body = Place(mesh.placement, origin_);
+    body.is_mesh = true;
+    body.mesh = mesh.mesh;
+    for (Vec3& vertex : body.mesh.vertices) vertex *= mesh.scale;
+    return body;
+  }
+
   absl::StatusOr<SceneBody> operator()(const PendulumSettings& pendulum) const {
-    if (!(effect_.gravity_m_s2 > 0)) {
+    const double gravity = effect_.gravity_m_s2.At(pendulum.hit_time_s);
+    if (!(gravity > 0)) {
       return absl::InvalidArgumentError(
-          fmt::format("effect: gravity_m_s2: the pendulum \"{}\" swings only with gravity above 0, not {}", pendulum.name, effect_.gravity_m_s2));
+          fmt::format("effect: gravity_m_s2: the pendulum \"{}\" swings only with gravity above 0, not {}", pendulum.name, gravity));
     }
     std::vector<Rigid3> pose;
     motion_.Sample(pendulum.hit_time_s, pose);
@@ -134,8 +153,7 @@ class Placer {
     body.body_from_object = {Quat::Identity(), pendulum.arm_m * Vec3::UnitY()};
     const auto arm = ArmMesh(std::min(kArmRadius, 0.5 * pendulum.radius_m), std::max(pendulum.arm_m - pendulum.radius_m, 0.01));
     body.mesh = Join(arm, SphereMesh(pendulum.radius_m), -pendulum.arm_m * Vec3::UnitY());
-    const PendulumSwing swing(Radians(pendulum.start_angle_deg), effect_.gravity_m_s2, EquivalentLength(pendulum.arm_m, pendulum.radius_m),
-                              pendulum.hit_time_s);
+    const PendulumSwing swing(Radians(pendulum.start_angle_deg), gravity, EquivalentLength(pendulum.arm_m, pendulum.radius_m), pendulum.hit_time_s);
     // Heading 90° is +z, so it turns the x axis about −y.
     body.hinge = SceneBody::Hinge{.world_from_pivot = {TurnAbout(Vec3::UnitY(), -heading), pivot}, .arm = pendulum.arm_m, .swing = swing};
     body.start_s = std::max(swing.start_time(), 0.0);
@@ -153,6 +171,7 @@ class Placer {
 }  // namespace
 
 Rigid3 SceneBody::DrivenPose(double time) const {
+  if (path) return {Turned(path->rotation_deg.At(time)), path->position.At(time)};
   const Rigid3 pivot_from_object{TurnAbout(Vec3::UnitZ(), hinge->swing.Angle(time)), Vec3::Zero()};
   return hinge->world_from_pivot * pivot_from_object * body_from_object.Inverse();
 }
@@ -189,7 +208,8 @@ absl::StatusOr<Scene> MakeScene(const Effect& effect, const Cells& cells, const 
   Scene scene;
   if (effect.ground.enabled) scene.ground_height = ground;
   std::vector<Rigid3> first_pose(motion.AtFrame(0), motion.AtFrame(0) + motion.cell_count());
-  const Placer placer(effect, cells, motion, TakeOrigin(first_pose, ground));
+  scene.take_origin = TakeOrigin(first_pose, ground);
+  const Placer placer(effect, cells, motion, scene.take_origin);
   for (const ObjectSettings& object : effect.objects) {
     ASSIGN_OR_RETURN(SceneBody body, std::visit(placer, object));
     scene.bodies.push_back(std::move(body));

@@ -15,16 +15,17 @@
 
 namespace vorocast::simulation {
 
-/// A scene object with its place worked out. Its body is a ball or a box about the body's origin; what is drawn has its own frame.
+/// A scene object with its place worked out. Its body is a ball or a box about the body's origin, or the mesh; what is drawn has its own frame.
 struct SceneBody {
   enum class Motion : std::uint8_t {
     kFixed,   // never moves
     kLoose,   // held until start_s, then moves by physics
-    kDriven,  // follows `swing` whatever it hits
+    kDriven,  // follows its swing or its path whatever it hits
   };
   std::string name;
   Motion motion = Motion::kLoose;
   std::optional<geometry::Vec3> box_half;  // metres; empty for a ball
+  bool is_mesh = false;                    // `mesh` is what things collide with; a loose one as its convex hull
   double radius = 0;                       // of the ball
   double mass = 1;                         // kg
   Surface surface;
@@ -42,6 +43,13 @@ struct SceneBody {
   };
   std::optional<Hinge> hinge;
 
+  // What is driven along key frames only.
+  struct Path {
+    Vector position;  // world
+    Vector rotation_deg;
+  };
+  std::optional<Path> path;
+
   /// Where a driven body is at `time`.
   geometry::Rigid3 DrivenPose(double time) const;
   /// The state in which a loose body is let go at `time`, the first step's at or after start_s: `start`, or a pendulum's in its swing.
@@ -50,6 +58,7 @@ struct SceneBody {
 
 struct Scene {
   std::optional<double> ground_height;
+  geometry::Vec3 take_origin = geometry::Vec3::Zero();  // on the ground under the middle of the first frame
   std::vector<SceneBody> bodies;
 };
 

@@ -28,10 +28,16 @@ int StepsInFrame(const Effect& effect, double fastest, double frame_time) {
 }  // namespace
 
 absl::StatusOr<geometry::SimulatedTake> Simulate(const geometry::TrackedTake& take, const nlohmann::json& effect_json, const base::Progress& progress,
-                                                 const Cancelled& cancelled) {
+                                                 const Cancelled& cancelled, const geometry::TrackedTake* target) {
   ASSIGN_OR_RETURN(const nlohmann::json canonical, NormaliseEffect(effect_json));
   ASSIGN_OR_RETURN(const Effect effect, EffectFromCanonicalJson(canonical));
   RETURN_IF_ERROR(CheckTake(take));
+  if (effect.morph && target == nullptr) {
+    return absl::InvalidArgumentError("effect: morph: it needs a second tracked take to turn this one into, and there is none");
+  }
+  if (effect.morph) {
+    if (const absl::Status status = CheckTake(*target); !status.ok()) return base::Annotate(status, "the take to turn into");
+  }
 
   const geometry::Cells& cells = take.model.cells;
   const TrackedMotion motion(take);
@@ -40,7 +46,7 @@ absl::StatusOr<geometry::SimulatedTake> Simulate(const geometry::TrackedTake& ta
 
   const double fps = effect.output_fps.value_or(take.frames_per_second);
   const double frame_time = 1 / fps;
-  const double duration = std::max(effect.duration_s.value_or(motion.duration_s()), effect.duration_min_s);
+  const double duration = Duration(effect, motion);
   const double instants = std::floor(duration * fps + 1e-6) + 1;
   if (instants > kInstantsMax) {
     return absl::InvalidArgumentError(fmt::format("effect: duration_s: {} stored frames; at most {} can be stored", instants, kInstantsMax));
@@ -53,6 +59,7 @@ absl::StatusOr<geometry::SimulatedTake> Simulate(const geometry::TrackedTake& ta
   for (std::size_t s = 0; s < static_cast<std::size_t>(instants); ++s) {
     if (s > 0) {
       const int steps = StepsInFrame(effect, run.FastestForeign(), frame_time);
+      result.step_count += steps;
       for (int i = 0; i < steps; ++i) RETURN_IF_ERROR(run.Step(frame_time / steps));
     }
     result.time.push_back(static_cast<double>(s) * frame_time);
@@ -60,6 +67,11 @@ absl::StatusOr<geometry::SimulatedTake> Simulate(const geometry::TrackedTake& ta
     base::Report(progress, static_cast<double>(s + 1) / instants);
     if (cancelled && cancelled()) return absl::CancelledError("simulation cancelled");
   }
+  if (effect.morph) AddMorph(*effect.morph, motion, TrackedMotion(*target), result);
+  RETURN_IF_ERROR(AddCopies(effect.persistence, run.subject(), result));
+  result.cell_penetration_m = run.deepest_penetration().cells;
+  result.object_penetration_m = run.deepest_penetration().objects;
+  result.ground_penetration_m = run.deepest_penetration().ground;
   return result;
 }
 

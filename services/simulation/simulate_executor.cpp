@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <optional>
+
 #include "services/simulation/simulate.h"
 #include "services/storage/hdf5_artifacts.h"
 #include "services/tasks/options.h"
@@ -13,18 +15,29 @@ absl::Status SimulateExecutor::Execute(const tasks::TaskSpec& spec, const storag
                                        const base::Progress& progress) {
   tasks::SimulateOptions options;
   RETURN_IF_ERROR(FromJson(spec.options, options));
-  if (spec.inputs.size() != 1 || spec.inputs[0].role != "tracked" || !spec.inputs[0].digest) {
-    return absl::InvalidArgumentError("a simulate task reads exactly one input \"tracked\"");
+  const auto is = [&](std::size_t i, const char* role) { return spec.inputs[i].role == role && spec.inputs[i].digest; };
+  const std::size_t inputs = spec.inputs.size();
+  if (inputs < 1 || inputs > 2 || !is(0, "tracked") || (inputs == 2 && !is(1, "target"))) {
+    return absl::InvalidArgumentError("a simulate task reads one input \"tracked\", and for a morph a second one \"target\"");
   }
   const base::Digest& tracked = *spec.inputs[0].digest;
   ASSIGN_OR_RETURN(const geometry::TrackedTake take, storage::ReadTrackedTake(store.ArtifactPath(tracked, spec.inputs[0].extension)));
-  ASSIGN_OR_RETURN(const geometry::SimulatedTake result, Simulate(take, options.effect, progress));
+  std::optional<geometry::TrackedTake> target;
+  std::vector<std::string> names = {fmt::format("tracked:{}", tracked.Hex())};
+  if (inputs == 2) {
+    ASSIGN_OR_RETURN(target, storage::ReadTrackedTake(store.ArtifactPath(*spec.inputs[1].digest, spec.inputs[1].extension)));
+    names.push_back(fmt::format("target:{}", spec.inputs[1].digest->Hex()));
+  }
+  ASSIGN_OR_RETURN(const geometry::SimulatedTake result, Simulate(take, options.effect, progress, {}, target ? &*target : nullptr));
+  // To the log of the process that holds the lease.
+  fmt::print(stderr, "deepest penetration: cells {:.1f} mm, objects {:.1f} mm, ground {:.1f} mm\n", 1e3 * result.cell_penetration_m,
+             1e3 * result.object_penetration_m, 1e3 * result.ground_penetration_m);
   const storage::Provenance provenance{.kind = std::string(tasks::Name(spec.kind)),
                                        .key = spec.Key().Hex(),
                                        .kernel_version = tasks::KernelVersion(spec.kind),
                                        .options_json = spec.options.dump(),
                                        .seed = 0,
-                                       .inputs = {fmt::format("tracked:{}", tracked.Hex())}};
+                                       .inputs = std::move(names)};
   return storage::WriteSimulatedTake(output, result, provenance);
 }
 

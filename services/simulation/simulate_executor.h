@@ -5,7 +5,8 @@
 
 namespace vorocast::simulation {
 
-/// tracked.h5 and an effect -> simulated.h5. The one input has the role "tracked"; the options are tasks::SimulateOptions.
+/// tracked.h5 and an effect -> simulated.h5. The input has the role "tracked"; an effect with a morph has a second one, a tracked.h5 too, with the
+/// role "target". The options are tasks::SimulateOptions.
 class SimulateExecutor : public lease::Executor {
  public:
   tasks::Kind kind() const override { return tasks::Kind::kSimulate; }

@@ -4,15 +4,22 @@
 #include <vector>
 
 #include "services/geometry/simulated_take.h"
+#include "services/simulation/bonds.h"
 #include "services/simulation/cell_shapes.h"
+#include "services/simulation/distortion.h"
 #include "services/simulation/effect_settings.h"
+#include "services/simulation/force_fields.h"
 #include "services/simulation/nearness.h"
 #include "services/simulation/recall.h"
+#include "services/simulation/release_schedule.h"
 #include "services/simulation/scene.h"
 #include "services/simulation/tracked_motion.h"
 #include "services/simulation/world.h"
 
 namespace vorocast::simulation {
+
+/// How long an effect runs on a take, seconds.
+double Duration(const Effect& effect, const TrackedMotion& motion);
 
 /// The state of one effect running on one take, advanced step by step.
 ///
@@ -31,22 +38,38 @@ class SimulationRun {
   double FastestForeign() const;
   /// Appends what is stored of an instant: poses are world_from_template.
   void Record(const geometry::Cells& cells, geometry::SimulatedTake& result) const;
+  const MaskSubject& subject() const { return subject_; }
+  const Bonds& bonds() const { return bonds_; }
+  /// Since the run began.
+  const World::Penetration& deepest_penetration() const { return deepest_; }
 
  private:
   struct Cell {
     BodyState body;  // in the cell's frame (tracked_motion.h)
     geometry::CellState state = geometry::CellState::kRecalled;
     bool disturbed = false;
-    int far_steps = 0;  // since something foreign was near
+    int far_steps = 0;       // since something foreign was near
+    RecallStep plan;         // of a disturbed recalled cell, for the step at hand
+    double asleep_push = 0;  // m/s², what the fields did to a released cell when it last lay still
   };
 
+  void SetKeyFrames();
   void ReleaseDueCells();
+  void BlowOnReleasedCells(double dt);
   void FindWhatMayCollide(double dt);
   void RecallCells(double dt);
+  void PlanRecalled(std::size_t c, double dt);
+  void MoveRecalled(std::size_t c, double dt);
+  void HoldTogether(double dt);
+  Bonds::Body BondBody(std::size_t c, double dt) const;
   void MoveObjects(double dt);
   absl::Status ReadBackCells();
 
   void Release(std::size_t c);
+  void Disturb(std::size_t c);
+  geometry::Vec3 PushOnRecalled(std::size_t c) const;
+  Spring SpringOf(const Spring& spring, std::size_t c) const;
+  float ScaleOf(std::size_t c) const;
   geometry::Vec3 TargetVelocity(std::size_t c) const { return (target_[c].translation - previous_target_[c].translation) / previous_dt_; }
   geometry::Vec3 TargetAngularVelocity(std::size_t c) const;
 
@@ -54,11 +77,25 @@ class SimulationRun {
   const TrackedMotion& motion_;
   const Scene& scene_;
   const std::vector<CellShape>& shapes_;
-  const Spring linear_spring_;
-  const Spring angular_spring_;
-  const std::vector<double> release_time_;
-  geometry::Vec3 middle_;  // of the first frame: cells too far from it are gone
+  const MaskSubject subject_;
+  const ReleaseSchedule schedule_;
+  const std::vector<double> recall_weight_;
+  const std::vector<double> rupture_weight_;
+  ForceFields fields_;
+  const Distortion distortion_;
+  Bonds bonds_;
+  std::vector<Bonds::Body> bond_bodies_;  // of the step at hand; a member only to keep its memory
+  const bool vanishes_;                   // whether any cell ever does
+  geometry::Vec3 middle_;                 // of the first frame: cells too far from it are gone
 
+  // What key frames say for the step at hand.
+  Spring linear_spring_;
+  Spring angular_spring_;
+  double gravity_ = 0;
+  geometry::Vec3 weight_left_ = geometry::Vec3::Zero();  // what of a recalled cell's weight its spring has to carry, m/s²
+  double rupture_m_s2_ = 0;
+
+  World::Penetration deepest_;
   double time_ = 0;
   double previous_dt_;
   std::vector<geometry::Rigid3> previous_target_;

@@ -13,7 +13,7 @@ using geometry::Rigid3;
 using geometry::TrackedTake;
 using geometry::Vec3;
 
-TrackedMotion::TrackedMotion(const TrackedTake& take) : cell_count_(take.cell_count()) {
+TrackedMotion::TrackedMotion(const TrackedTake& take) : model_(&take.model), cell_count_(take.cell_count()) {
   const std::vector<std::int32_t>& frames = take.patches.frames;
   for (const std::int32_t frame : frames) frame_time_.push_back((static_cast<double>(frame) - frames.front()) / take.frames_per_second);
   at_frame_.resize(frames.size() * cell_count_);
@@ -58,6 +58,13 @@ absl::Status CheckCells(const Cells& cells) {
   if (std::ranges::any_of(cells.vertex, [&](std::int32_t v) { return v < 0 || v >= vertices; })) {
     return absl::InvalidArgumentError("tracked take: a face of the template names a vertex that is not there");
   }
+  if (cells.neighbour.size() != static_cast<std::size_t>(faces) ||
+      std::ranges::any_of(cells.neighbour, [&](std::int32_t c) { return c < -1 || c >= static_cast<std::int64_t>(n); })) {
+    return absl::InvalidArgumentError("tracked take: a face of the template names a neighbour that is not there");
+  }
+  if (cells.depth.size() != n || cells.component.size() != n || !std::ranges::all_of(cells.depth, [](double d) { return std::isfinite(d); })) {
+    return absl::InvalidArgumentError("tracked take: the template's depths or components do not have one value a cell");
+  }
   const auto finite = [](const Vec3& x) { return x.allFinite(); };
   if (!std::ranges::all_of(cells.vertices, finite) || !std::ranges::all_of(cells.centroid, finite) ||
       !std::ranges::all_of(cells.volume, [](double v) { return std::isfinite(v); })) {
@@ -70,6 +77,7 @@ absl::Status CheckCells(const Cells& cells) {
 
 absl::Status CheckTake(const TrackedTake& take) {
   RETURN_IF_ERROR(CheckCells(take.model.cells));
+  if (take.model.patch.size() != take.cell_count()) return absl::InvalidArgumentError("tracked take: the template does not have one patch a cell");
   const std::vector<std::int32_t>& frames = take.patches.frames;
   if (frames.empty()) return absl::InvalidArgumentError("tracked take: it has no frames");
   if (std::ranges::adjacent_find(frames, std::greater_equal<>()) != frames.end())

@@ -16,6 +16,7 @@ class TrackedMotion {
   /// `take` outlives this, and has passed CheckTake.
   explicit TrackedMotion(const geometry::TrackedTake& take);
 
+  const geometry::Template& model() const { return *model_; }
   /// Seconds from the first frame to the last.
   double duration_s() const { return frame_time_.back(); }
   std::size_t cell_count() const { return cell_count_; }
@@ -28,6 +29,7 @@ class TrackedMotion {
   void Sample(double time, std::vector<geometry::Rigid3>& world_from_cell) const;
 
  private:
+  const geometry::Template* model_;
   std::size_t cell_count_;
   std::vector<double> frame_time_;          // [F]
   std::vector<geometry::Rigid3> at_frame_;  // [F*n]

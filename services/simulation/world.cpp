@@ -83,6 +83,7 @@ void SetMass(CellBody& cell, double resistance, double angular_resistance) {
 }
 
 struct ObjectBody {
+  std::unique_ptr<btTriangleMesh> triangles;  // outlives the shape
   std::unique_ptr<btCollisionShape> shape;
   std::unique_ptr<btRigidBody> body;
   std::unique_ptr<btHingeConstraint> hinge;
@@ -90,6 +91,37 @@ struct ObjectBody {
   double arm = 0;  // of a pendulum, metres
   bool driven = false;
 };
+
+}  // namespace
+
+namespace {
+
+/// What a loose mesh collides as: its convex hull, thinned out as a cell's.
+std::unique_ptr<btCollisionShape> MakeHullShape(const geometry::TriangleMesh& mesh) {
+  CellShape shape;
+  shape.all_corners = mesh.vertices;
+  shape.hull = ThinOutCorners(mesh.vertices);
+  for (const Vec3& corner : shape.hull) shape.radius = std::max(shape.radius, corner.norm() + kHullMargin);
+  return std::make_unique<CellHull>(shape, static_cast<float>(kUnits));
+}
+
+std::unique_ptr<btCollisionShape> MakeObjectShape(const SceneBody& body, std::unique_ptr<btTriangleMesh>& triangles) {
+  if (body.is_mesh && body.motion == SceneBody::Motion::kLoose) return MakeHullShape(body.mesh);
+  if (body.is_mesh) {
+    triangles = std::make_unique<btTriangleMesh>();
+    const auto corner = [&](std::int32_t v) { return LengthToBullet(body.mesh.vertices[static_cast<std::size_t>(v)]); };
+    for (const auto& triangle : body.mesh.triangles) triangles->addTriangle(corner(triangle[0]), corner(triangle[1]), corner(triangle[2]));
+    auto shape = std::make_unique<btBvhTriangleMeshShape>(triangles.get(), true);
+    shape->setMargin(static_cast<float>(kUnits * kHullMargin));
+    return shape;
+  }
+  if (body.box_half) {
+    auto box = std::make_unique<btBoxShape>(LengthToBullet(*body.box_half));
+    box->setMargin(static_cast<float>(kUnits * kHullMargin));
+    return box;
+  }
+  return std::make_unique<btSphereShape>(static_cast<float>(kUnits * body.radius));
+}
 
 }  // namespace
 
@@ -107,6 +139,7 @@ struct World::Bodies {
   std::vector<CellBody> cells;
   std::vector<ObjectBody> objects;
   btVector3 gravity{0, 0, 0};
+  double in_ground = 0;  // metres, the deepest that a cell was left below the ground
 
   /// What Bullet's contacts leave undone for cells on the ground. A few iterations cannot carry a heap on a light cell: what is left below
   /// the ground is put back on it. And lumps are not balls: their corners take the turning out of them, or they would roll away for ever.
@@ -115,6 +148,7 @@ struct World::Bodies {
     constexpr double kRollingDecay = 25.0;  // 1/s
     const auto kept_turning = static_cast<float>(std::exp(-kRollingDecay * dt));
     const float ground_height = ground_shape->getPlaneConstant();
+    in_ground = 0;
     for (CellBody& cell : cells) {
       if (!cell.inside || !cell.released || !cell.body->isActive()) continue;
       const btTransform& pose = cell.body->getWorldTransform();
@@ -127,6 +161,7 @@ struct World::Bodies {
       if (above > kSlop) continue;
       cell.body->setAngularVelocity(kept_turning * cell.body->getAngularVelocity());
       const float lift = -kSlop - above;
+      in_ground = std::max(in_ground, std::min(kSlop, -above) / kUnits);
       if (lift <= 0) continue;
       btTransform lifted = pose;
       lifted.getOrigin().setY(pose.getOrigin().y() + lift);
@@ -185,6 +220,7 @@ void World::AddCells(const std::vector<CellShape>& shapes, const Surface& surfac
     cell.body->setFlags(BT_DISABLE_WORLD_GRAVITY);
     cell.body->setSleepingThresholds(kSleepSpeed, kSleepTurn);
     SetSurface(*cell.body, surface);
+    cell.body->setUserIndex(static_cast<int>(bodies_->cells.size()));
     bodies_->cells.push_back(std::move(cell));
   }
 }
@@ -194,13 +230,7 @@ void World::AddObject(const SceneBody& scene_body) {
   object.mass = scene_body.mass;
   object.arm = scene_body.hinge ? scene_body.hinge->arm : 0;
   object.driven = scene_body.motion == SceneBody::Motion::kDriven;
-  if (scene_body.box_half) {
-    auto box = std::make_unique<btBoxShape>(LengthToBullet(*scene_body.box_half));
-    box->setMargin(static_cast<float>(kUnits * kHullMargin));
-    object.shape = std::move(box);
-  } else {
-    object.shape = std::make_unique<btSphereShape>(static_cast<float>(kUnits * scene_body.radius));
-  }
+  object.shape = MakeObjectShape(scene_body, object.triangles);
   // Held objects and fixed ones have no mass until they are let go.
   object.body = std::make_unique<btRigidBody>(btRigidBody::btRigidBodyConstructionInfo(0, nullptr, object.shape.get()));
   PlaceBody(*object.body, {.position = scene_body.start.position, .rotation = scene_body.start.rotation}, Quat::Identity());
@@ -213,6 +243,8 @@ void World::AddObject(const SceneBody& scene_body) {
   bodies_->world.addRigidBody(object.body.get(), kObject, kGround | kRecalledCell | kReleasedCell | kObject);
   bodies_->objects.push_back(std::move(object));
 }
+
+void World::LetPartnersOverlap(const std::vector<std::vector<std::int32_t>>* partners) { bodies_->broadphase.LetPartnersOverlap(partners); }
 
 void World::Enter(std::size_t index, Role role, const BodyState& state) {
   CellBody& cell = bodies_->cells[index];
@@ -250,6 +282,26 @@ void World::SetVelocity(std::size_t index, const Push& push) {
   SetMass(cell, push.resistance, push.angular_resistance);
   cell.body->setLinearVelocity(LengthToBullet(push.velocity));
   cell.body->setAngularVelocity(ToBullet(push.angular_velocity));
+}
+
+void World::SetReleasedVelocity(std::size_t index, const Vec3& velocity, const Vec3& angular_velocity) {
+  CellBody& cell = bodies_->cells[index];
+  cell.body->setLinearVelocity(LengthToBullet(velocity));
+  cell.body->setAngularVelocity(ToBullet(angular_velocity));
+  if (!cell.body->isActive()) cell.body->activate();
+}
+
+void World::SetGravity(double gravity) {
+  const btVector3 next = LengthToBullet(Vec3(0, -gravity, 0));
+  if (next == bodies_->gravity) return;
+  bodies_->gravity = next;
+  bodies_->world.setGravity(next);
+  for (CellBody& cell : bodies_->cells) {
+    if (!cell.inside || !cell.released) continue;
+    cell.body->setGravity(next);
+    cell.body->activate();
+  }
+  for (ObjectBody& object : bodies_->objects) object.body->activate();
 }
 
 BodyState World::State(std::size_t index) const {
@@ -296,6 +348,23 @@ geometry::Box3 World::ObjectBounds(std::size_t index) const {
 void World::Step(double dt) {
   bodies_->world.stepSimulation(static_cast<float>(dt), 0);
   if (bodies_->ground) bodies_->SettleOnGround(dt);
+}
+
+World::Penetration World::DeepestPenetration() const {
+  Penetration deepest{.ground = bodies_->in_ground};
+  const btDispatcher& dispatcher = bodies_->dispatcher;
+  for (int m = 0; m < dispatcher.getNumManifolds(); ++m) {
+    const btPersistentManifold& manifold = *bodies_->dispatcher.getManifoldByIndexInternal(m);
+    const int groups =
+        manifold.getBody0()->getBroadphaseHandle()->m_collisionFilterGroup | manifold.getBody1()->getBroadphaseHandle()->m_collisionFilterGroup;
+    if ((groups & kGround) != 0 || (groups & (kRecalledCell | kReleasedCell)) == 0) continue;
+    double depth = 0;
+    for (int i = 0; i < manifold.getNumContacts(); ++i)
+      depth = std::max(depth, -static_cast<double>(manifold.getContactPoint(i).getDistance()) / kUnits);
+    double& kind = (groups & kObject) != 0 ? deepest.objects : deepest.cells;
+    kind = std::max(kind, depth);
+  }
+  return deepest;
 }
 
 }  // namespace vorocast::simulation

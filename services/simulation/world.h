@@ -25,6 +25,8 @@ class World {
 
   void AddCells(const std::vector<CellShape>& shapes, const Surface& surface);
   void AddObject(const SceneBody& body);
+  /// Cells that never collide with each other, [n] lists or none; outlives the world and may change between steps.
+  void LetPartnersOverlap(const std::vector<std::vector<std::int32_t>>* partners);
 
   /// Puts a cell into the world, or changes its role there.
   void Enter(std::size_t cell, Role role, const BodyState& state);
@@ -38,6 +40,10 @@ class World {
     double angular_resistance = 1;
   };
   void SetVelocity(std::size_t cell, const Push& push);
+  /// A released cell's velocities, changed from outside; it wakes if it sleeps.
+  void SetReleasedVelocity(std::size_t cell, const geometry::Vec3& velocity, const geometry::Vec3& angular_velocity);
+  /// Wakes everything when it changes.
+  void SetGravity(double gravity);
   /// In the cell's frame (template axes). The cell is in the world.
   BodyState State(std::size_t cell) const;
   /// Whether the cell lies still and is left out of the computation until something touches it.
@@ -51,6 +57,14 @@ class World {
   geometry::Box3 ObjectBounds(std::size_t object) const;
 
   void Step(double dt);
+
+  /// How deep things were in each other at the last step's collision detection, metres; of the ground, what was left after the step.
+  struct Penetration {
+    double cells = 0;    // of two cells
+    double objects = 0;  // of a cell in an object
+    double ground = 0;   // of a cell in the ground
+  };
+  Penetration DeepestPenetration() const;
 
  private:
   struct Bodies;

@@ -155,6 +155,8 @@ std::string FaultIn(const geometry::PoseTrack& track) {
   if (finder.found()) return finder.fault();
   finder.Size(track.world_from_template.size(), frames * static_cast<std::size_t>(track.patch_count), "/patches/rotation");
   finder.Poses(track.world_from_template, "/patches/rotation", "/patches/translation");
+  finder.Require(track.cell_pose.empty() || track.cell_pose.size() % frames == 0, "/cells/rotation", "has not as many cells in every frame");
+  finder.Poses(track.cell_pose, "/cells/rotation", "/cells/translation");
   return finder.fault();
 }
 
@@ -177,6 +179,63 @@ std::string FaultIn(const geometry::SimulatedTake& take) {
                  "has not as many cells at every instant");
   finder.CellPoses(take.cell_rotation, take.cell_translation, take.cell_state.size());
   finder.Each(take.cell_state, "/cells/state", "is unknown", [](geometry::CellState state) { return state <= geometry::CellState::kGone; });
+  if (!take.cell_scale.empty()) {
+    finder.Size(take.cell_scale.size(), take.cell_state.size(), "/cells/scale");
+    finder.Each(take.cell_scale, "/cells/scale", "is not within 0 and 1", [](float scale) { return scale >= 0 && scale <= 1; });
+  }
+  if (const geometry::CellMorphs& morph = take.morph; !morph.vertex_offset.empty()) {
+    const std::size_t pairs = morph.source.size();
+    const auto offsets = [&](const std::vector<std::int64_t>& offset, std::size_t end, const char* name) {
+      finder.Size(offset.size(), pairs + 1, name);
+      finder.Require(
+          !offset.empty() && offset.front() == 0 && offset.back() == static_cast<std::int64_t>(end) && std::is_sorted(offset.begin(), offset.end()),
+          name, "does not ascend from 0 to the length that it indexes");
+    };
+    const auto cells = static_cast<std::int64_t>(steps == 0 ? 0 : take.cell_state.size() / steps);
+    finder.Each(morph.source, "/morph/source", "is no cell", [cells](std::int32_t cell) { return cell >= -1 && cell < cells; });
+    finder.Size(morph.target.size(), pairs, "/morph/target");
+    offsets(morph.vertex_offset, morph.from.size(), "/morph/vertex_offset");
+    finder.Size(morph.to.size(), morph.from.size(), "/morph/to");
+    finder.Finite(morph.from, "/morph/from");
+    finder.Finite(morph.to, "/morph/to");
+    offsets(morph.triangle_offset, morph.triangles.size(), "/morph/triangle_offset");
+    if (finder.found()) return finder.fault();
+    for (std::size_t p = 0; p < pairs; ++p) {
+      const std::int64_t corners = morph.vertex_offset[p + 1] - morph.vertex_offset[p];
+      for (std::int64_t t = morph.triangle_offset[p]; t < morph.triangle_offset[p + 1]; ++t) {
+        const auto& triangle = morph.triangles[static_cast<std::size_t>(t)];
+        finder.Require(std::all_of(triangle.begin(), triangle.end(), [corners](std::int32_t i) { return i >= 0 && i < corners; }), "/morph/triangles",
+                       "has an index out of range");
+      }
+    }
+    const auto share = [](float x) { return x >= 0 && x <= 1; };
+    finder.Size(morph.blend.size(), steps * pairs, "/morph/blend");
+    finder.Each(morph.blend, "/morph/blend", "is not within 0 and 1", share);
+    finder.Size(morph.scale.size(), steps * pairs, "/morph/scale");
+    finder.Each(morph.scale, "/morph/scale", "is not within 0 and 2", [](float x) { return x >= 0 && x <= 2; });
+    finder.Size(morph.rotation.size(), steps * pairs, "/morph/rotation");
+    finder.Each(morph.rotation, "/morph/rotation", "is no unit quaternion",
+                [](const Eigen::Vector4f& q) { return q.allFinite() && std::abs(q.norm() - 1) < 1e-3F; });
+    finder.Size(morph.translation.size(), steps * pairs, "/morph/translation");
+    finder.Each(morph.translation, "/morph/translation", "is not finite", [](const geometry::Vec3f& x) { return x.allFinite(); });
+  }
+  if (const geometry::CellCopies& copies = take.copies; !copies.offset.empty()) {
+    const std::size_t rows = copies.cell.size();
+    const auto cells = static_cast<std::int64_t>(steps == 0 ? 0 : take.cell_state.size() / steps);
+    finder.Size(copies.offset.size(), steps + 1, "/copies/offset");
+    finder.Require(copies.offset.front() == 0 && copies.offset.back() == static_cast<std::int64_t>(rows) &&
+                       std::is_sorted(copies.offset.begin(), copies.offset.end()),
+                   "/copies/offset", "does not ascend from 0 to the number of rows");
+    finder.Each(copies.cell, "/copies/cell", "is no cell", [cells](std::int32_t cell) { return cell >= 0 && cell < cells; });
+    finder.Size(copies.copy.size(), rows, "/copies/copy");
+    finder.Size(copies.rotation.size(), rows, "/copies/rotation");
+    finder.Each(copies.rotation, "/copies/rotation", "is no unit quaternion",
+                [](const Eigen::Vector4f& q) { return q.allFinite() && std::abs(q.norm() - 1) < 1e-3F; });
+    finder.Size(copies.translation.size(), rows, "/copies/translation");
+    finder.Each(copies.translation, "/copies/translation", "is not finite", [](const geometry::Vec3f& x) { return x.allFinite(); });
+    finder.Size(copies.scale.size(), rows, "/copies/scale");
+    finder.Each(copies.scale, "/copies/scale", "is not within 0 and 1", [](float scale) { return scale >= 0 && scale <= 1; });
+  }
   for (const geometry::SceneObject& object : take.objects) {
     finder.Finite(object.mesh.vertices, "/objects/vertices");
     const auto vertices = static_cast<std::int64_t>(object.mesh.vertices.size());

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 #include "services/capture/frame_reader.h"
 #include "services/rendering/sheet.h"
+#include "services/rendering/simulated_picture.h"
 #include "services/tasks/options.h"
 #include "workers/agent/task_inputs.h"
 
@@ -97,20 +98,12 @@ absl::StatusOr<rendering::Image> DrawSimulated(const Sheet& sheet) {
   ASSIGN_OR_RETURN(const std::filesystem::path path, PathOfOnly(sheet.spec, "simulated", sheet.store));
   ASSIGN_OR_RETURN(const geometry::SimulatedTake take, storage::ReadSimulatedTake(path));
   const std::size_t n = tracked.cell_count();
-  const std::size_t m = take.objects.size();
   if (take.cell_state.size() != take.time.size() * n) {
     return absl::InvalidArgumentError("simulated.h5 has another number of cells than the tracked.h5 it is to be drawn with");
   }
   std::vector<rendering::CellsPicture> pictures;
   for (const std::size_t s : EvenlySpread(take.time.size(), sheet.options.pictures)) {
-    rendering::CellsPicture picture{.cells = &tracked.model.cells, .patch = &tracked.model.patch, .label = fmt::format("{:.2f} s", take.time[s])};
-    for (std::size_t i = s * n; i < (s + 1) * n; ++i) {
-      const Eigen::Vector4f& q = take.cell_rotation[i];
-      picture.world_from_template.push_back({geometry::Quat(q[0], q[1], q[2], q[3]).normalized(), take.cell_translation[i]});
-      picture.state.push_back(take.cell_state[i]);
-    }
-    for (std::size_t o = 0; o < m; ++o) picture.objects.emplace_back(&take.objects[o].mesh, take.object_pose[s * m + o]);
-    pictures.push_back(std::move(picture));
+    pictures.push_back(rendering::PictureOf(tracked.model, take, s));
   }
   if (pictures.empty()) return absl::FailedPreconditionError("the simulation stored no instant, so there is nothing to draw");
   return rendering::RenderSheet(pictures, sheet.Layout("simulated"), Part(sheet.progress, kRead, 1));

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <numbers>
 #include <vector>
 
@@ -88,6 +90,40 @@ inline void AddCell(Cells& cells, const Polyhedron& polyhedron, const Vec3& cent
   cells.boundary.push_back(0);
   cells.depth.push_back(0);
   cells.component.push_back(0);
+}
+
+/// Names the cell on the other side of each face, by the middles of the faces; sets depths as the distance of the centroid from the nearest
+/// face that has none.
+inline void ConnectNeighbours(Cells& cells) {
+  std::map<std::array<long, 3>, std::vector<std::pair<std::size_t, std::size_t>>> at;  // middle -> cell, face
+  std::vector<Vec3> middles;
+  for (std::size_t c = 0; c < cells.size(); ++c) {
+    for (auto f = static_cast<std::size_t>(cells.face_offset[c]); f < static_cast<std::size_t>(cells.face_offset[c + 1]); ++f) {
+      Vec3 middle = Vec3::Zero();
+      const auto first = cells.vertex_offset[f];
+      const auto last = cells.vertex_offset[f + 1];
+      for (auto i = first; i < last; ++i) middle += cells.vertices[cells.vertex[i]] / static_cast<double>(last - first);
+      middles.push_back(middle);
+      std::array<long, 3> key;
+      for (int axis = 0; axis < 3; ++axis) key[axis] = std::lround(middle[axis] * 1e5);
+      at[key].emplace_back(c, f);
+    }
+  }
+  std::vector<Vec3> skin;
+  for (const auto& [key, sides] : at) {
+    if (sides.size() != 2) {
+      skin.push_back(middles[sides[0].second]);
+      cells.boundary[sides[0].first] = 1;
+      continue;
+    }
+    cells.neighbour[sides[0].second] = static_cast<std::int32_t>(sides[1].first);
+    cells.neighbour[sides[1].second] = static_cast<std::int32_t>(sides[0].first);
+  }
+  for (std::size_t c = 0; c < cells.size(); ++c) {
+    double nearest = 1e9;
+    for (const Vec3& x : skin) nearest = std::min(nearest, (x - cells.centroid[c]).norm());
+    cells.depth[c] = nearest;
+  }
 }
 
 /// world_from_template of the cell at a template point, at a time.
