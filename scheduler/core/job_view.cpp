@@ -44,6 +44,10 @@ double TypicalSeconds(tasks::Kind kind, std::int32_t frames) {
       return 2 + 0.1 * frames;
     case tasks::Kind::kSheet:
       return 15;
+    case tasks::Kind::kRender:
+      return 5;
+    case tasks::Kind::kEncode:
+      return 0.3 * frames;
   }
   return 1;
 }

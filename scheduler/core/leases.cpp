@@ -17,12 +17,14 @@ absl::Duration TimeLimit(tasks::Kind kind) {
       return absl::Minutes(20);
     case tasks::Kind::kTemplate:
     case tasks::Kind::kSheet:
+    case tasks::Kind::kRender:
       return absl::Hours(1);
     case tasks::Kind::kStretch:
     case tasks::Kind::kTrack:
       return absl::Hours(2);
     case tasks::Kind::kGuide:
     case tasks::Kind::kAssemble:
+    case tasks::Kind::kEncode:
       return absl::Hours(4);
     case tasks::Kind::kSimulate:
       return absl::Hours(24);

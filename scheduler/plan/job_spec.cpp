@@ -40,7 +40,8 @@ nlohmann::json ToJson(const JobSpec& job) {
           {"frames_per_second", job.frames_per_second},
           {"track", tasks::ToJson(job.track)},
           {"effect", job.effect},
-          {"sheets", job.sheets}};
+          {"sheets", job.sheets},
+          {"film", job.film ? tasks::ToJson(*job.film) : nlohmann::json()}};
 }
 
 absl::StatusOr<JobSpec> JobSpecFromJson(const nlohmann::json& json) {
@@ -57,6 +58,7 @@ absl::StatusOr<JobSpec> JobSpecFromJson(const nlohmann::json& json) {
   RETURN_IF_ERROR(ReadOptions(json, "track", job.track));
   RETURN_IF_ERROR(Read(json, "effect", job.effect));
   RETURN_IF_ERROR(Read(json, "sheets", job.sheets));
+  if (const auto film = json.find("film"); film != json.end() && !film->is_null()) RETURN_IF_ERROR(ReadOptions(json, "film", job.film.emplace()));
   return job;
 }
 

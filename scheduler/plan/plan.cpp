@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 
+#include "scheduler/plan/film.h"
+
 namespace vorocast::plan {
 namespace {
 
@@ -241,6 +243,10 @@ absl::StatusOr<std::vector<PlannedTask>> Plan(const JobSpec& job, const std::vec
   if (!job.effect.is_null()) planned.push_back(Simulate(job));
   if (job.sheets) {
     for (PlannedTask& sheet : Sheets(job, frames)) planned.push_back(std::move(sheet));
+  }
+  if (job.film) {
+    ASSIGN_OR_RETURN(std::vector<PlannedTask> film, Film(job, frames, std::string(kAssemble), job.effect.is_null() ? "" : SimulateName(job.effect)));
+    std::move(film.begin(), film.end(), std::back_inserter(planned));
   }
   return planned;
 }

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -33,6 +34,7 @@ struct JobSpec {
   tasks::TrackOptions track;
   nlohmann::json effect;  // null: tracking only
   bool sheets = true;
+  std::optional<tasks::FilmOptions> film;
 };
 
 /// An input by name of the planned task that makes it; its digest is known when that task has ended.

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "services/rendering/film_camera.h"
 #include "services/simulation/effect.h"
 
 namespace vorocast::server {
@@ -40,6 +41,28 @@ absl::StatusOr<nlohmann::json> EffectOf(const std::string& text) {
   return effect;
 }
 
+absl::StatusOr<tasks::FilmOptions> FilmOf(const v1::Film& film) {
+  tasks::FilmOptions options;
+  if (film.width() != 0) options.width = film.width();
+  if (film.height() != 0) options.height = film.height();
+  if (film.samples() != 0) options.samples = film.samples();
+  if (!(film.shutter() < 0)) options.shutter = film.shutter();
+  if (!film.colour().empty()) options.colour = film.colour();
+  if (film.camera_json().size() > kEffectBytesMax) {
+    return absl::InvalidArgumentError(
+        fmt::format("film: camera_json has {} bytes; at most {} are taken", film.camera_json().size(), kEffectBytesMax));
+  }
+  if (!film.camera_json().empty()) {
+    options.camera = nlohmann::json::parse(film.camera_json(), nullptr, false);
+    if (options.camera.is_discarded()) return absl::InvalidArgumentError("film: camera_json is not JSON");
+    if (const auto path = rendering::CameraPathFromJson(options.camera); !path.ok()) return base::Annotate(path.status(), "film");
+  }
+  // The tasks' own checks know the limits.
+  tasks::FilmOptions checked;
+  if (const absl::Status status = tasks::FromJson(tasks::ToJson(options), checked); !status.ok()) return base::Annotate(status, "film");
+  return checked;
+}
+
 }  // namespace
 
 absl::StatusOr<plan::JobSpec> SpecOf(const v1::SubmitJobRequest& request) {
@@ -63,6 +86,9 @@ absl::StatusOr<plan::JobSpec> SpecOf(const v1::SubmitJobRequest& request) {
   spec.overlap_frames = std::min(spec.overlap_frames, spec.window_frames - 1);
   spec.interpolated_max = std::max(request.interpolated_max(), -1);
   spec.sheets = request.sheets();
+  if (request.has_film()) {
+    ASSIGN_OR_RETURN(spec.film, FilmOf(request.film()));
+  }
   ASSIGN_OR_RETURN(spec.effect, EffectOf(request.effect_json()));
   // The tasks' own checks know the choices.
   tasks::TessellateOptions checked;

@@ -2,11 +2,17 @@
 #include "services/client/job_flags.h"
 
 #include <charconv>
+#include <cstdio>
 #include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <optional>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
+#include "services/rendering/film_camera.h"
 #include "services/simulation/effect.h"
 
 namespace vorocast::client {
@@ -22,6 +28,21 @@ std::optional<std::int32_t> ParseNumber(const std::string& text) {
 std::string UserName() {
   const char* user = std::getenv("USER");
   return user && *user ? user : "unknown";
+}
+
+absl::StatusOr<std::string> ReadCamera(const std::string& path) {
+  constexpr std::uintmax_t kBytesMax = 1 << 20;
+  std::error_code error;
+  const std::uintmax_t size = std::filesystem::file_size(path, error);
+  if (error) return absl::NotFoundError(fmt::format("--camera {}: {}", path, error.message()));
+  if (size > kBytesMax)
+    return absl::InvalidArgumentError(fmt::format("--camera {}: {} bytes are no camera; at most {} are read", path, size, kBytesMax));
+  std::ifstream file(path);
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  const auto json = nlohmann::json::parse(text, nullptr, false);
+  if (json.is_discarded()) return absl::InvalidArgumentError(fmt::format("--camera {}: is not JSON", path));
+  if (const auto read = rendering::CameraPathFromJson(json); !read.ok()) return base::Annotate(read.status(), path);
+  return text;
 }
 
 }  // namespace
@@ -87,6 +108,16 @@ void JobFlags::AddTo(CLI::App& command) {
       ->check(CLI::IsMember({"lattice", "random"}));
   command.add_option("--priority", priority, "Larger goes first")->capture_default_str();
   command.add_flag("--no-sheets", no_sheets, "Make no contact sheets");
+  command.add_flag("--film", film, "Render every instant as OpenEXR, and a movie of them (docs/film.md)");
+  command.add_option("--film-size", film_size, "Width x height in pixels")->capture_default_str();
+  command.add_option("--samples", samples, "Camera rays a pixel")->capture_default_str()->check(CLI::Range(1, 64));
+  command.add_option("--shutter", shutter, "Part of the time between two pictures that it is open; 0: no motion blur")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 1.0));
+  command.add_option("--colour", colour, "Colours of the film: of the captured points, or of patches")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"capture", "patch"}));
+  command.add_option("--camera", camera, "JSON file with the film's camera (docs/film.md); left out, it shows the whole performance");
 }
 
 absl::StatusOr<v1::SubmitJobRequest> JobFlags::Parse() const {
@@ -107,6 +138,23 @@ absl::StatusOr<v1::SubmitJobRequest> JobFlags::Parse() const {
     const auto number = ParseNumber(template_frame);
     if (!number) return absl::InvalidArgumentError(fmt::format("--template {}: write a frame number, or auto", template_frame));
     request.set_template_frame(*number);
+  }
+  if (film) {
+    v1::Film& asked = *request.mutable_film();
+    int width = 0, height = 0, used = 0;
+    if (std::sscanf(film_size.c_str(), "%dx%d%n", &width, &height, &used) != 2 || static_cast<std::size_t>(used) != film_size.size()) {
+      return absl::InvalidArgumentError(fmt::format("--film-size {}: write WIDTHxHEIGHT, for example 1920x1080", film_size));
+    }
+    asked.set_width(width);
+    asked.set_height(height);
+    asked.set_samples(samples);
+    asked.set_shutter(shutter);
+    asked.set_colour(colour);
+    if (!camera.empty()) {
+      ASSIGN_OR_RETURN(*asked.mutable_camera_json(), ReadCamera(camera));
+    }
+  } else if (!camera.empty()) {
+    return absl::InvalidArgumentError("--camera is for the film: give --film too");
   }
   if (!effect.empty()) {
     ASSIGN_OR_RETURN(const nlohmann::json loaded, simulation::LoadEffect(effect));

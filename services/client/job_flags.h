@@ -27,6 +27,10 @@ struct JobFlags {
   std::int32_t cells = 5000, iterations = 10, patches = 0, window = 10, bad_frames_max = -1, priority = 0;
   std::string template_frame = "auto", effect, indicator = "spectral", start = "lattice";
   bool no_sheets = false;
+  bool film = false;
+  std::string film_size = "1920x1080", colour = "capture", camera;
+  std::int32_t samples = 4;
+  double shutter = 0.5;
 
   void AddTo(CLI::App& command);
   /// Everything but the sequence. The effect is read and checked here, so that a mistake in it is told before anything is sent.

@@ -104,11 +104,15 @@ absl::Status WriteXdmfBeside(const std::filesystem::path& folder) {
 
 void PrintResults(const v1::Job& job, const std::filesystem::path& out, double seconds) {
   fmt::print("\n{} after {}. Results in {}:\n", job.state() == v1::DONE ? "Done" : "Ended", FormatDuration(seconds), out.string());
+  // One line for what is one file a frame.
+  const auto in_folder = [](const std::string& folder) { return [folder](const v1::Output& output) { return output.name().starts_with(folder); }; };
   for (const v1::Output& output : job.outputs()) {
-    if (!output.name().starts_with("cells/")) fmt::print("  {:<24} {:>8.1f} MB\n", output.name(), static_cast<double>(output.size()) / 1e6);
+    if (in_folder("cells/")(output) || in_folder("film/")(output)) continue;
+    fmt::print("  {:<24} {:>8.1f} MB\n", output.name(), static_cast<double>(output.size()) / 1e6);
   }
-  const auto cells = std::ranges::count_if(job.outputs(), [](const v1::Output& output) { return output.name().starts_with("cells/"); });
-  if (cells > 0) fmt::print("  {:<24} {} frames\n", "cells/", cells);
+  for (const std::string folder : {"cells/", "film/"}) {
+    if (const auto count = std::ranges::count_if(job.outputs(), in_folder(folder)); count > 0) fmt::print("  {:<24} {} files\n", folder, count);
+  }
 }
 
 }  // namespace

@@ -25,6 +25,20 @@ struct Motion {
   geometry::Rigid3 at_next;   // one picture later than it opens: for motion vectors
 };
 
+/// A cell that is there once more, paler.
+struct FilmCopy {
+  std::int32_t cell = 0;
+  Motion motion;
+  float scale = 1;
+};
+
+/// A polyhedron that is no cell of the template any more, with the colour and the name of one.
+struct FilmShape {
+  geometry::TriangleMesh mesh;  // about its middle, as the shutter opens
+  Motion motion;
+  std::int32_t cell = 0;
+};
+
 /// What stands before the camera. n cells.
 struct FilmSubject {
   const geometry::Cells* cells = nullptr;
@@ -33,6 +47,8 @@ struct FilmSubject {
   std::vector<Motion> motion;                            // [n]
   std::vector<geometry::CellState> state;                // [n]: kGone cells are not drawn
   std::vector<float> scale;                              // [n] size about the centroid, or empty
+  std::vector<FilmCopy> copies;
+  std::vector<FilmShape> shapes;
   std::vector<std::pair<const geometry::SceneObject*, Motion>> objects;
   double seconds_per_picture = 0.04;
 };

@@ -24,47 +24,12 @@ Vec3f ObjectColour() { return {0.46F, 0.47F, 0.49F}; }
 /// Cells are drawn a little smaller than they are, so that seams show as fine lines and faces that touch do not fight.
 constexpr double kShrink = 0.998;
 
-struct MeshWithIds {
-  Triangles triangles;
-  std::vector<std::int32_t> ids;
+/// Copies stand back behind the performer.
+Vec3f CopyColour(const Vec3f& colour) { return 0.55F * colour + Vec3f::Constant(0.45F); }
 
-  void Add(std::span<const Vec3> corners, const Motion& motion, bool moving, const Vec3f& colour, std::int32_t id) {
-    for (const auto& triangle : geometry::Triangulate(corners)) {
-      for (const std::int32_t i : triangle) {
-        const Vec3& corner = corners[static_cast<std::size_t>(i)];
-        triangles.corners.push_back((motion.at_open * corner).cast<float>());
-        if (moving) triangles.corners_at_close.push_back((motion.at_close * corner).cast<float>());
-      }
-      triangles.colours.push_back(colour);
-      ids.push_back(id);
-    }
-  }
-};
-
-void AddCell(const FilmSubject& subject, std::size_t cell, bool moving, MeshWithIds& mesh) {
-  const Cells& cells = *subject.cells;
-  const double size = kShrink * (subject.scale.empty() ? 1 : static_cast<double>(subject.scale[cell]));
-  const Vec3f skin = subject.colour ? (*subject.colour)[cell] : PatchColour(subject.patch ? (*subject.patch)[cell] : static_cast<std::int32_t>(cell));
-  const Vec3 centroid = cells.centroid[cell];
-  std::vector<Vec3> corners;
-  for (std::int64_t f = cells.face_offset[cell]; f < cells.face_offset[cell + 1]; ++f) {
-    const auto face = static_cast<std::size_t>(f);
-    corners.clear();
-    for (std::int64_t i = cells.vertex_offset[face]; i < cells.vertex_offset[face + 1]; ++i) {
-      const Vec3& vertex = cells.vertices[static_cast<std::size_t>(cells.vertex[static_cast<std::size_t>(i)])];
-      corners.push_back(centroid + size * (vertex - centroid));
-    }
-    mesh.Add(corners, subject.motion[cell], moving, cells.neighbour[face] < 0 ? skin : CutColour(skin), static_cast<std::int32_t>(cell));
-  }
-}
-
-void AddObject(const geometry::SceneObject& object, const Motion& motion, bool moving, std::int32_t id, MeshWithIds& mesh) {
-  mesh.triangles.metal = true;
-  for (const auto& t : object.mesh.triangles) {
-    const Vec3 corners[] = {object.mesh.vertices[static_cast<std::size_t>(t[0])], object.mesh.vertices[static_cast<std::size_t>(t[1])],
-                            object.mesh.vertices[static_cast<std::size_t>(t[2])]};
-    mesh.Add(corners, motion, moving, ObjectColour(), id);
-  }
+Vec3f SkinColour(const FilmSubject& subject, std::int32_t cell) {
+  if (subject.colour) return (*subject.colour)[static_cast<std::size_t>(cell)];
+  return PatchColour(subject.patch ? (*subject.patch)[static_cast<std::size_t>(cell)] : cell);
 }
 
 bool IsFinite(const Motion& motion) {
@@ -82,6 +47,15 @@ absl::Status Check(const FilmSubject& subject) {
   }
   for (std::size_t cell = 0; cell < n; ++cell) {
     if (!IsFinite(subject.motion[cell])) return absl::InvalidArgumentError(fmt::format("the pose of cell {} is not finite", cell));
+  }
+  const auto is_cell = [n](std::int32_t cell) { return cell >= 0 && static_cast<std::size_t>(cell) < n; };
+  for (const FilmCopy& copy : subject.copies) {
+    if (!is_cell(copy.cell) || !IsFinite(copy.motion))
+      return absl::InvalidArgumentError(fmt::format("a copy of cell {} of {}, or its pose, is wrong", copy.cell, n));
+  }
+  for (const FilmShape& shape : subject.shapes) {
+    if (!is_cell(shape.cell) || !IsFinite(shape.motion))
+      return absl::InvalidArgumentError(fmt::format("a shape of cell {} of {}, or its pose, is wrong", shape.cell, n));
   }
   for (const auto& [object, motion] : subject.objects) {
     if (!IsFinite(motion)) return absl::InvalidArgumentError(fmt::format("the pose of {} is not finite", object->name));
@@ -102,35 +76,82 @@ struct PointCloud {
 
 }  // namespace
 
+struct FilmScene::PieceMesh {
+  bool moving = false;
+  Triangles triangles;
+  std::vector<std::uint32_t> piece_of;
+
+  void Add(std::span<const Vec3> corners, const Motion& motion, const Vec3f& colour, std::uint32_t piece) {
+    for (const auto& triangle : geometry::Triangulate(corners)) {
+      for (const std::int32_t i : triangle) {
+        const Vec3& corner = corners[static_cast<std::size_t>(i)];
+        triangles.corners.push_back((motion.at_open * corner).cast<float>());
+        if (moving) triangles.corners_at_close.push_back((motion.at_close * corner).cast<float>());
+      }
+      triangles.colours.push_back(colour);
+      piece_of.push_back(piece);
+    }
+  }
+
+  void AddCell(const Cells& cells, std::int32_t number, double scale, const Motion& motion, const Vec3f& skin, std::uint32_t piece) {
+    const auto cell = static_cast<std::size_t>(number);
+    const Vec3 centroid = cells.centroid[cell];
+    std::vector<Vec3> corners;
+    for (std::int64_t f = cells.face_offset[cell]; f < cells.face_offset[cell + 1]; ++f) {
+      const auto face = static_cast<std::size_t>(f);
+      corners.clear();
+      for (std::int64_t i = cells.vertex_offset[face]; i < cells.vertex_offset[face + 1]; ++i) {
+        const Vec3& vertex = cells.vertices[static_cast<std::size_t>(cells.vertex[static_cast<std::size_t>(i)])];
+        corners.push_back(centroid + kShrink * scale * (vertex - centroid));
+      }
+      Add(corners, motion, cells.neighbour[face] < 0 ? skin : CutColour(skin), piece);
+    }
+  }
+
+  void AddMesh(const geometry::TriangleMesh& mesh, const Motion& motion, const Vec3f& colour, std::uint32_t piece) {
+    for (const auto& t : mesh.triangles) {
+      const Vec3 corners[] = {mesh.vertices[static_cast<std::size_t>(t[0])], mesh.vertices[static_cast<std::size_t>(t[1])],
+                              mesh.vertices[static_cast<std::size_t>(t[2])]};
+      Add(corners, motion, colour, piece);
+    }
+  }
+};
+
 absl::StatusOr<FilmScene> FilmScene::Build(const FilmSubject& subject, bool moving) {
   RETURN_IF_ERROR(Check(subject));
-  std::vector<Triangles> meshes;
-  std::vector<std::vector<std::int32_t>> ids;
-  const auto keep = [&](MeshWithIds& mesh) {
-    meshes.push_back(std::move(mesh.triangles));
-    ids.push_back(std::move(mesh.ids));
+  std::vector<Piece> pieces;
+  const auto piece = [&](std::int32_t id, const Motion& motion) {
+    pieces.push_back({id, &motion});
+    return static_cast<std::uint32_t>(pieces.size() - 1);
   };
-  MeshWithIds cells;
-  for (std::size_t cell = 0; cell < subject.cells->size(); ++cell) {
-    if (subject.state[cell] != CellState::kGone) AddCell(subject, cell, moving, cells);
+  PieceMesh body{.moving = moving};
+  PieceMesh objects{.moving = moving};
+  objects.triangles.metal = true;
+  for (std::size_t c = 0; c < subject.cells->size(); ++c) {
+    if (subject.state[c] == CellState::kGone) continue;
+    const auto cell = static_cast<std::int32_t>(c);
+    body.AddCell(*subject.cells, cell, subject.scale.empty() ? 1 : subject.scale[c], subject.motion[c], SkinColour(subject, cell),
+                 piece(cell, subject.motion[c]));
   }
-  keep(cells);
+  for (const FilmCopy& copy : subject.copies) {
+    body.AddCell(*subject.cells, copy.cell, copy.scale, copy.motion, CopyColour(SkinColour(subject, copy.cell)), piece(copy.cell, copy.motion));
+  }
+  for (const FilmShape& shape : subject.shapes)
+    body.AddMesh(shape.mesh, shape.motion, SkinColour(subject, shape.cell), piece(shape.cell, shape.motion));
   for (std::size_t i = 0; i < subject.objects.size(); ++i) {
-    MeshWithIds mesh;
-    AddObject(*subject.objects[i].first, subject.objects[i].second, moving, kObjectId - static_cast<std::int32_t>(i), mesh);
-    keep(mesh);
+    const auto& [object, motion] = subject.objects[i];
+    objects.AddMesh(object->mesh, motion, ObjectColour(), piece(kObjectId - static_cast<std::int32_t>(i), motion));
   }
+  std::vector<std::vector<std::uint32_t>> piece_of = {std::move(body.piece_of), std::move(objects.piece_of)};
+  std::vector<Triangles> meshes;
+  meshes.push_back(std::move(body.triangles));
+  meshes.push_back(std::move(objects.triangles));
   ASSIGN_OR_RETURN(Scene scene, Scene::Build({}, meshes));
-  return FilmScene(subject, std::move(scene), std::move(ids));
-}
-
-const Motion& FilmScene::MotionOf(const Hit& hit) const {
-  const std::int32_t id = IdOf(hit);
-  return id >= 0 ? subject_->motion[static_cast<std::size_t>(id)] : subject_->objects[static_cast<std::size_t>(kObjectId - id)].second;
+  return FilmScene(subject, std::move(scene), std::move(pieces), std::move(piece_of));
 }
 
 Vec3f FilmScene::OnePictureLater(const Hit& hit, const Vec3f& point) const {
-  const Motion& motion = MotionOf(hit);
+  const Motion& motion = *PieceOf(hit).motion;
   return (motion.at_next * (motion.at_open.Inverse() * point.cast<double>())).cast<float>();
 }
 

@@ -82,6 +82,27 @@ static void Describe(Table& table, SheetOptions& options) {
   table.Nested("capture", options.capture);
 }
 
+template <typename Table>
+static void Describe(Table& table, FilmOptions& options) {
+  table.Integer("width", options.width, 16, 16384);
+  table.Integer("height", options.height, 16, 16384);
+  table.Integer("samples", options.samples, 1, 64);
+  table.Number("shutter", options.shutter, 0, 1);
+  table.Choice("colour", options.colour, {"capture", "patch"});
+  table.Object("camera", options.camera);
+}
+
+template <typename Table>
+static void Describe(Table& table, RenderOptions& options) {
+  table.Nested("film", options.film);
+  table.Integer("instant", options.instant, 0, kFrameNumberMax);
+}
+
+template <typename Table>
+static void Describe(Table& table, EncodeOptions& options) {
+  table.Number("frames_per_second", options.frames_per_second, 1, 1000);
+}
+
 namespace {
 
 template <typename Options>
@@ -112,6 +133,9 @@ nlohmann::json ToJson(const TrackOptions& options) { return Write(options); }
 nlohmann::json ToJson(const AssembleOptions& options) { return Write(options); }
 nlohmann::json ToJson(const SimulateOptions& options) { return Write(options); }
 nlohmann::json ToJson(const SheetOptions& options) { return Write(options); }
+nlohmann::json ToJson(const FilmOptions& options) { return Write(options); }
+nlohmann::json ToJson(const RenderOptions& options) { return Write(options); }
+nlohmann::json ToJson(const EncodeOptions& options) { return Write(options); }
 
 absl::Status FromJson(const nlohmann::json& json, TessellateOptions& options) { return Read(json, options); }
 
@@ -143,5 +167,8 @@ absl::Status FromJson(const nlohmann::json& json, TrackOptions& target) {
 absl::Status FromJson(const nlohmann::json& json, AssembleOptions& options) { return Read(json, options); }
 absl::Status FromJson(const nlohmann::json& json, SimulateOptions& options) { return Read(json, options); }
 absl::Status FromJson(const nlohmann::json& json, SheetOptions& options) { return Read(json, options); }
+absl::Status FromJson(const nlohmann::json& json, FilmOptions& options) { return Read(json, options); }
+absl::Status FromJson(const nlohmann::json& json, RenderOptions& options) { return Read(json, options); }
+absl::Status FromJson(const nlohmann::json& json, EncodeOptions& options) { return Read(json, options); }
 
 }  // namespace vorocast::tasks

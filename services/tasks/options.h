@@ -51,9 +51,9 @@ struct GuideOptions {
 };
 
 struct TrackOptions {
-  std::int32_t iterations = 16;
-  double regulariser = 0.3;      // weight of the pose distance against unit data weights
-  double sigma_start_m = 0.020;  // soft-ICP scale, first and last iteration
+  std::int32_t iterations = 6;
+  double regulariser = 0.3;      // how smoothly cells deform, against unit data weights
+  double sigma_start_m = 0.010;  // soft-ICP scale, first and last iteration
   double sigma_end_m = 0.005;
   double normal_angle_max_deg = 45;  // θmax of the paper, section 4.3
   double depth_tolerance_m = 0.015;  // ε of the paper, section 4.3
@@ -77,6 +77,25 @@ struct SheetOptions {
   CaptureFrameOptions capture;  // for "points"
 };
 
+/// How a film looks: the same for all of its pictures.
+struct FilmOptions {
+  std::int32_t width = 1920;  // pixels, 16 … 16384
+  std::int32_t height = 1080;
+  std::int32_t samples = 4;                          // camera rays a pixel, 1 … 64; edges and motion get four times as many
+  double shutter = 0.5;                              // part of the time between two pictures that it is open, 0 … 1
+  std::string colour = "capture";                    // "capture": of the captured points, by patch where they have none; "patch"
+  nlohmann::json camera = nlohmann::json::object();  // docs/film.md; empty: shows the whole performance
+};
+
+struct RenderOptions {
+  FilmOptions film;
+  std::int32_t instant = 0;  // of those stored in the take
+};
+
+struct EncodeOptions {
+  double frames_per_second = 25;
+};
+
 nlohmann::json ToJson(const TessellateOptions&);
 nlohmann::json ToJson(const TemplateOptions&);
 nlohmann::json ToJson(const StretchOptions&);
@@ -85,6 +104,9 @@ nlohmann::json ToJson(const TrackOptions&);
 nlohmann::json ToJson(const AssembleOptions&);
 nlohmann::json ToJson(const SimulateOptions&);
 nlohmann::json ToJson(const SheetOptions&);
+nlohmann::json ToJson(const FilmOptions&);
+nlohmann::json ToJson(const RenderOptions&);
+nlohmann::json ToJson(const EncodeOptions&);
 
 absl::Status FromJson(const nlohmann::json&, TessellateOptions&);
 absl::Status FromJson(const nlohmann::json&, TemplateOptions&);
@@ -94,5 +116,8 @@ absl::Status FromJson(const nlohmann::json&, TrackOptions&);
 absl::Status FromJson(const nlohmann::json&, AssembleOptions&);
 absl::Status FromJson(const nlohmann::json&, SimulateOptions&);
 absl::Status FromJson(const nlohmann::json&, SheetOptions&);
+absl::Status FromJson(const nlohmann::json&, FilmOptions&);
+absl::Status FromJson(const nlohmann::json&, RenderOptions&);
+absl::Status FromJson(const nlohmann::json&, EncodeOptions&);
 
 }  // namespace vorocast::tasks

@@ -15,7 +15,8 @@ namespace {
 
 /// The template task of the longest take reads each frame's points and cells.
 constexpr std::size_t kInputsMax = 2 * kFramesMax;
-constexpr std::array<std::string_view, 9> kRoles = {"frame", "template", "stretch", "guide", "cells", "window", "tracked", "target", "simulated"};
+constexpr std::array<std::string_view, 10> kRoles = {"frame",  "template", "stretch", "guide",     "cells",
+                                                     "window", "tracked",  "target",  "simulated", "picture"};
 
 struct KindTraits {
   Kind kind;
@@ -24,9 +25,10 @@ struct KindTraits {
   std::string_view extension;
 };
 constexpr KindTraits kTraits[] = {
-    {Kind::kTessellate, "tessellate", 2, ".h5"}, {Kind::kTemplate, "template", 2, ".h5"}, {Kind::kStretch, "stretch", 1, ".h5"}, {Kind::kGuide, "guide", 2, ".h5"},
-    {Kind::kTrack, "track", 1, ".h5"},           {Kind::kAssemble, "assemble", 1, ".h5"}, {Kind::kSimulate, "simulate", 2, ".h5"},
-    {Kind::kSheet, "sheet", 1, ".png"},
+    {Kind::kTessellate, "tessellate", 2, ".h5"}, {Kind::kTemplate, "template", 2, ".h5"}, {Kind::kStretch, "stretch", 2, ".h5"},
+    {Kind::kGuide, "guide", 3, ".h5"},           {Kind::kTrack, "track", 2, ".h5"},       {Kind::kAssemble, "assemble", 2, ".h5"},
+    {Kind::kSimulate, "simulate", 2, ".h5"},     {Kind::kSheet, "sheet", 1, ".png"},      {Kind::kRender, "render", 1, ".exr"},
+    {Kind::kEncode, "encode", 1, ".mp4"},
 };
 
 const KindTraits& Traits(Kind kind) {
@@ -62,6 +64,10 @@ absl::Status CheckOptions(Kind kind, const nlohmann::json& json) {
       return CheckOptions<SimulateOptions>(json);
     case Kind::kSheet:
       return CheckOptions<SheetOptions>(json);
+    case Kind::kRender:
+      return CheckOptions<RenderOptions>(json);
+    case Kind::kEncode:
+      return CheckOptions<EncodeOptions>(json);
   }
   return absl::InvalidArgumentError("kind is unknown");
 }

@@ -24,21 +24,23 @@ enum class Kind : std::uint8_t {
   kAssemble,    // template + all windows -> tracked.h5
   kSimulate,    // tracked.h5 + effect -> simulated.h5
   kSheet,       // pictures of one stage -> PNG
+  kRender,      // tracked.h5, simulated.h5 + an instant -> EXR
+  kEncode,      // all rendered pictures -> MP4
 };
-inline constexpr Kind kAllKinds[] = {Kind::kTessellate, Kind::kTemplate, Kind::kStretch,  Kind::kGuide,
-                                     Kind::kTrack,      Kind::kAssemble, Kind::kSimulate, Kind::kSheet};
+inline constexpr Kind kAllKinds[] = {Kind::kTessellate, Kind::kTemplate, Kind::kStretch, Kind::kGuide,  Kind::kTrack,
+                                     Kind::kAssemble,   Kind::kSimulate, Kind::kSheet,   Kind::kRender, Kind::kEncode};
 
 std::string_view Name(Kind kind);                          // "tessellate", …
 absl::StatusOr<Kind> KindFromName(std::string_view name);  // INVALID_ARGUMENT lists the names
 /// Raised whenever a change of code changes a result's bytes; part of every key.
 int KernelVersion(Kind kind);
-/// The file-name extension of the kind's result, with its dot: ".h5" or ".png".
+/// The file-name extension of the kind's result, with its dot: ".h5", ".png", ".exr" or ".mp4".
 std::string_view Extension(Kind kind);
 
 /// One thing a task reads. A captured frame is a blob named by its bytes; a result is an artifact named by what made it.
 struct Input {
   enum class Source : std::uint8_t { kBlob, kArtifact };
-  std::string role;         // "frame", "template", "stretch", "guide", "cells", "window", "tracked", "simulated"
+  std::string role;         // "frame", "template", "stretch", "guide", "cells", "window", "tracked", "simulated", "picture"
   std::int32_t frame = -1;  // captured frame number it stands for, or −1
   Source source = Source::kArtifact;
   std::string extension;  // of the stored file, with its dot: ".ply", ".h5"

@@ -2,7 +2,9 @@
 #include "workers/agent/executors.h"
 
 #include "workers/agent/assemble_executor.h"
+#include "workers/agent/encode_executor.h"
 #include "workers/agent/guide_executor.h"
+#include "workers/agent/render_executor.h"
 #include "workers/agent/sheet_executor.h"
 #include "workers/agent/stretch_executor.h"
 #include "workers/agent/template_executor.h"
@@ -20,6 +22,8 @@ std::vector<std::unique_ptr<lease::Executor>> AllExecutors() {
   executors.push_back(std::make_unique<TrackExecutor>());
   executors.push_back(std::make_unique<AssembleExecutor>());
   executors.push_back(std::make_unique<SheetExecutor>());
+  executors.push_back(std::make_unique<RenderExecutor>());
+  executors.push_back(std::make_unique<EncodeExecutor>());
   return executors;
 }
 

@@ -56,6 +56,32 @@ TEST(JobFlags, AnEffectThatIsNoneIsRefusedBeforeAnythingIsSent) {
   EXPECT_THAT(std::string(request.status().message()), HasSubstr("pendulum"));
 }
 
+TEST(JobFlags, AFilmIsAskedForWithItsSize) {
+  JobFlags flags;
+  ASSERT_TRUE(flags.Parse().ok());
+  EXPECT_FALSE(flags.Parse()->has_film());
+  flags.film = true;
+  flags.film_size = "640x360";
+  flags.shutter = 0;
+  const auto request = flags.Parse();
+  ASSERT_TRUE(request.ok()) << request.status();
+  EXPECT_EQ(request->film().width(), 640);
+  EXPECT_EQ(request->film().height(), 360);
+  EXPECT_EQ(request->film().shutter(), 0);
+  for (const char* size : {"640", "640x", "640x360p", "x"}) {
+    flags.film_size = size;
+    EXPECT_THAT(std::string(flags.Parse().status().message()), HasSubstr("WIDTHxHEIGHT")) << size;
+  }
+}
+
+TEST(JobFlags, ACameraIsCheckedBeforeAnythingIsSent) {
+  JobFlags flags;
+  flags.camera = "/nowhere/camera.json";
+  EXPECT_THAT(std::string(flags.Parse().status().message()), HasSubstr("give --film too"));
+  flags.film = true;
+  EXPECT_THAT(std::string(flags.Parse().status().message()), HasSubstr("/nowhere/camera.json"));
+}
+
 TEST(JobFlags, TemplateIsAFrameOrAuto) {
   JobFlags flags;
   EXPECT_EQ(flags.Parse()->template_frame(), -1);

@@ -43,6 +43,10 @@ TEST(Options, GoBothWays) {
   ExpectRoundTrip(AssembleOptions{.frames_per_second = 29.97, .frames = {1, 2}, .interpolated_max = 0}, 3);
   ExpectRoundTrip(SimulateOptions{.effect = {{"gravity", {0, -9.81, 0}}}}, 1);
   ExpectRoundTrip(SheetOptions{.stage = "tracked", .pictures = 2, .width = 100}, 4);
+  const FilmOptions film{.width = 640, .height = 360, .samples = 9, .shutter = 0.25, .colour = "patch", .camera = {{"fov_deg", 20}}};
+  ExpectRoundTrip(film, 6);
+  ExpectRoundTrip(RenderOptions{.film = film, .instant = 17}, 2);
+  ExpectRoundTrip(EncodeOptions{.frames_per_second = 29.97}, 1);
 }
 
 TEST(Options, ReadingKeepsEveryValue) {

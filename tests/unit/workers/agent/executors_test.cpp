@@ -11,6 +11,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include "services/base/random.h"
+#include "services/rendering/exr.h"
 #include "services/storage/hdf5_artifacts.h"
 #include "services/tasks/options.h"
 #include "tests/unit/services/storage/temporary_folder.h"
@@ -240,7 +241,30 @@ TEST_F(ExecutorsTest, ATakeGoesThroughTheWholeGraph) {
   ASSERT_EQ(storage::WriteSimulatedTake(temporary, simulated, {}), absl::OkStatus());
   const base::Digest key = base::HashBytes("a simulation");
   ASSERT_EQ(store_.PublishArtifact(temporary, key, ".h5"), absl::OkStatus());
-  expect_png("simulated", {{"simulated", -1, Input::Source::kArtifact, ".h5", key}, tracked});
+  const Input simulated_input{"simulated", -1, Input::Source::kArtifact, ".h5", key};
+  expect_png("simulated", {simulated_input, tracked});
+
+  // A film: pictures of the instants, and a movie that does without one of them.
+  const auto picture = [&](std::int32_t instant, const nlohmann::json& camera) {
+    const tasks::RenderOptions options{.film = {.width = 32, .height = 24, .samples = 1, .camera = camera}, .instant = instant};
+    return Make({Kind::kRender, ToJson(options), {tracked, simulated_input}}, "picture", instant);
+  };
+  const Input opening = picture(0, nlohmann::json::object());
+  const rendering::FilmPicture shown = rendering::ReadExrBeauty(PathOf(opening)).value();
+  const auto covered = [](const rendering::FilmPicture& film) {
+    return std::ranges::count_if(film.rgba, [](const auto& pixel) { return pixel[3] > 0.5F; });
+  };
+  EXPECT_EQ(shown.width, 32);
+  EXPECT_GT(covered(shown), 100);
+  const auto away = nlohmann::json::parse(R"({"eye_m": [0, 1, 50], "target_m": [0, 1, 100]})");
+  EXPECT_EQ(covered(rendering::ReadExrBeauty(PathOf(picture(1, away))).value()), 0);
+  const Input missing{"picture", 1, Input::Source::kArtifact, ".exr", std::nullopt};
+  const Input movie = Make({Kind::kEncode, ToJson(tasks::EncodeOptions{}), {opening, missing}}, "movie");
+  std::ostringstream bytes;
+  bytes << std::ifstream(PathOf(movie), std::ios::binary).rdbuf();
+  EXPECT_EQ(bytes.str().substr(4, 4), "ftyp");
+  EXPECT_THAT(std::string(Execute({Kind::kRender, ToJson(tasks::RenderOptions{.instant = 2}), {tracked, simulated_input}}).status().message()),
+              HasSubstr("picture 2 of a take of 2 instants"));
 }
 
 TEST_F(ExecutorsTest, TheSameTaskMakesTheSameBytes) {
