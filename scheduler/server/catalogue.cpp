@@ -12,6 +12,9 @@
 namespace vorocast::server {
 namespace {
 
+/// Milliseconds of work.
+constexpr std::size_t kTasksATurn = 250;
+
 std::vector<plan::PlannedFrame> PlannedFrames(const std::vector<store::FrameAdded>& frames) {
   std::vector<plan::PlannedFrame> planned;
   planned.reserve(frames.size());
@@ -31,19 +34,63 @@ absl::StatusOr<plan::JobSpec> SpecOf(const CatalogueJob& job) {
 
 }  // namespace
 
-void Catalogue::Plan(Turn& turn, const CatalogueJob& job, const CatalogueSequence& sequence, const std::vector<store::FrameAdded>& frames) const {
-  core::TasksAdded added{.job = job.added.id, .complete = sequence.closed};
+void Catalogue::Plan(const CatalogueJob& job, std::optional<std::vector<store::FrameAdded>> frames) {
+  const auto less_urgent = [](std::int32_t priority, const Planning& planning) { return priority > planning.priority; };
+  const auto place = std::upper_bound(plannings_.begin(), plannings_.end(), job.added.priority, less_urgent);
+  plannings_.insert(place, {.job = job.added.id, .priority = job.added.priority, .frames = std::move(frames)});
+}
+
+absl::Status Catalogue::Expand(Planning& planning) {
+  const CatalogueJob& job = jobs_.at(planning.job);
+  CatalogueSequence& sequence = sequences_.at(job.added.sequence);
+  core::TasksAdded& added = planning.added.emplace(core::TasksAdded{.job = planning.job});
+  RETURN_IF_ERROR(NeedFrames(sequence));
+  const bool whole = !planning.frames;
+  added.complete = whole && sequence.closed;
   const auto spec = SpecOf(job);
-  auto planned =
-      spec.ok() ? plan::Plan(*spec, PlannedFrames(frames), sequence.closed) : absl::StatusOr<std::vector<plan::PlannedTask>>(spec.status());
-  if (planned.ok()) {
-    if (spec->interpolated_max >= 0) added.bad_frames_max = spec->interpolated_max;
-    if (sequence.closed) added.bad_frames_max = plan::InterpolatedMax(*spec, static_cast<std::int32_t>(sequence.frame_count));
-    added.tasks = *std::move(planned);
-  } else {
+  auto planned = spec.ok() ? plan::Plan(*spec, PlannedFrames(whole ? AllFrames(sequence) : *planning.frames), added.complete)
+                           : absl::StatusOr<std::vector<plan::PlannedTask>>(spec.status());
+  if (!planned.ok()) {
     added.impossible = std::string(planned.status().message());
+    return absl::OkStatus();
   }
-  turn.Apply(std::move(added));
+  if (spec->interpolated_max >= 0) added.bad_frames_max = spec->interpolated_max;
+  if (sequence.closed) added.bad_frames_max = plan::InterpolatedMax(*spec, static_cast<std::int32_t>(sequence.frame_count));
+  added.tasks = *std::move(planned);
+  return absl::OkStatus();
+}
+
+bool Catalogue::PlanSome(Turn& turn) {
+  if (plannings_.empty()) return false;
+  Planning& planning = plannings_.front();
+  if (jobs_.at(planning.job).ended) {
+    plannings_.pop_front();
+    return !plannings_.empty();
+  }
+  if (!planning.added) {
+    if (const absl::Status status = Expand(planning); !status.ok()) {
+      // One job that cannot be read must not keep the others from going on.
+      spdlog::error("job passed over: job={} error=\"{}\"", planning.job, std::string(status.message()));
+      plannings_.pop_front();
+      return !plannings_.empty();
+    }
+  }
+  core::TasksAdded& all = *planning.added;
+  const std::size_t last = std::min(all.tasks.size(), planning.next + kTasksATurn);
+  if (planning.next == 0 && last == all.tasks.size()) {
+    turn.Apply(std::move(all));
+    plannings_.pop_front();
+    return !plannings_.empty();
+  }
+  core::TasksAdded some{.job = all.job, .bad_frames_max = all.bad_frames_max};
+  const auto from = all.tasks.begin() + static_cast<std::ptrdiff_t>(planning.next);
+  const auto to = all.tasks.begin() + static_cast<std::ptrdiff_t>(last);
+  some.tasks.assign(std::make_move_iterator(from), std::make_move_iterator(to));
+  some.complete = all.complete && last == all.tasks.size();
+  planning.next = last;
+  turn.Apply(std::move(some));
+  if (last == all.tasks.size()) plannings_.pop_front();
+  return !plannings_.empty();
 }
 
 absl::Status Catalogue::NeedFrames(CatalogueSequence& sequence) const {
@@ -51,12 +98,6 @@ absl::Status Catalogue::NeedFrames(CatalogueSequence& sequence) const {
   ASSIGN_OR_RETURN(std::vector<store::FrameAdded> frames, store_.LoadFrames(sequence.opened.id));
   sequence.frames.emplace();
   for (store::FrameAdded& frame : frames) sequence.frames->emplace(frame.number, std::move(frame));
-  return absl::OkStatus();
-}
-
-absl::Status Catalogue::PlanWhole(Turn& turn, const CatalogueJob& job, CatalogueSequence& sequence) const {
-  RETURN_IF_ERROR(NeedFrames(sequence));
-  Plan(turn, job, sequence, AllFrames(sequence));
   return absl::OkStatus();
 }
 
@@ -89,23 +130,9 @@ absl::Status Catalogue::Restore(Turn& turn, store::Snapshot snapshot) {
                                   .priority = job.added.priority,
                                   .cancelled = stored.cancelled,
                                   .failures = std::move(stored.failures)});
-    unplanned_.push_back(id);
+    Plan(job);
   }
-  std::stable_sort(unplanned_.begin(), unplanned_.end(),
-                   [this](const std::string& a, const std::string& b) { return jobs_.at(a).added.priority > jobs_.at(b).added.priority; });
   return absl::OkStatus();
-}
-
-bool Catalogue::PlanNext(Turn& turn) {
-  if (unplanned_.empty()) return false;
-  const CatalogueJob& job = jobs_.at(unplanned_.front());
-  const absl::Status status = PlanWhole(turn, job, sequences_.at(job.added.sequence));
-  if (!status.ok()) {
-    // One job that cannot be read must not keep the others from going on.
-    spdlog::error("job passed over: job={} error=\"{}\"", job.added.id, std::string(status.message()));
-  }
-  unplanned_.pop_front();
-  return !unplanned_.empty();
 }
 
 absl::StatusOr<const CatalogueSequence*> Catalogue::Open(Turn& turn, store::SequenceOpened asked) {
@@ -166,7 +193,7 @@ absl::StatusOr<const CatalogueSequence*> Catalogue::Add(Turn& turn, const std::s
     added.push_back(std::move(frame));
   }
   sequence.frame_count = static_cast<std::int64_t>(sequence.frames->size());
-  for (const std::string& job : sequence.jobs) Plan(turn, jobs_.at(job), sequence, added);
+  for (const std::string& job : sequence.jobs) Plan(jobs_.at(job), added);
   return &sequence;
 }
 
@@ -177,7 +204,7 @@ absl::StatusOr<const CatalogueSequence*> Catalogue::Close(Turn& turn, const std:
   if (sequence.closed) return &sequence;
   sequence.closed = true;
   turn.Record(store::SequenceClosed{id});
-  for (const std::string& job : sequence.jobs) RETURN_IF_ERROR(PlanWhole(turn, jobs_.at(job), sequence));
+  for (const std::string& job : sequence.jobs) Plan(jobs_.at(job));
   return &sequence;
 }
 
@@ -193,7 +220,7 @@ absl::StatusOr<std::string> Catalogue::Submit(Turn& turn, const std::string& seq
   found->second.jobs.push_back(id);
   turn.Record(job.added);
   turn.Apply(core::JobSubmitted{.id = id, .name = found->second.opened.name, .user = user, .priority = priority});
-  RETURN_IF_ERROR(PlanWhole(turn, job, found->second));
+  Plan(job);
   return id;
 }
 
@@ -212,7 +239,8 @@ absl::Status Catalogue::Retry(Turn& turn, const std::string& id) {
   }
   turn.Record(core::Record(core::JobRetried{id}));
   turn.Apply(core::JobSubmitted{.id = id, .name = sequence.opened.name, .user = job.added.user, .priority = job.added.priority, .verify = true});
-  return PlanWhole(turn, job, sequence);
+  Plan(job);
+  return absl::OkStatus();
 }
 
 void Catalogue::End(const std::string& id) {

@@ -33,11 +33,11 @@ class Catalogue {
   /// `store` must outlive the catalogue.
   explicit Catalogue(store::Store& store) : store_(store) {}
 
-  /// Takes up what the store remembers; first turn of an engine. The jobs that go on are planned afterwards, by PlanNext.
+  /// Takes up what the store remembers; first turn of an engine. The jobs that go on are planned afterwards, by PlanSome.
   absl::Status Restore(Turn& turn, store::Snapshot snapshot);
-  /// Plans the most urgent of the restored jobs that have not been planned yet; whether there are more. In turns of their own, so that
-  /// the scheduler is back at work while a long queue is still being planned.
-  bool PlanNext(Turn& turn);
+  /// Tells the core of some of the tasks that follow from what has changed, most urgent jobs first; whether there are more. Called every turn: a
+  /// long take or a long restored queue neither holds up answers nor keeps the scheduler from working on what it knows already.
+  bool PlanSome(Turn& turn);
 
   /// The sequence of that session and name, opened if need be. ALREADY_EXISTS if it has other properties than asked for.
   absl::StatusOr<const CatalogueSequence*> Open(Turn& turn, store::SequenceOpened asked);
@@ -59,8 +59,16 @@ class Catalogue {
   absl::StatusOr<std::string> EndedText(const std::string& job, store::JobText which) const { return store_.FindJobText(job, which); }
 
  private:
-  void Plan(Turn& turn, const CatalogueJob& job, const CatalogueSequence& sequence, const std::vector<store::FrameAdded>& frames) const;
-  absl::Status PlanWhole(Turn& turn, const CatalogueJob& job, CatalogueSequence& sequence) const;
+  /// A job's tasks on their way to the core.
+  struct Planning {
+    std::string job;
+    std::int32_t priority = 0;
+    std::optional<std::vector<store::FrameAdded>> frames;  // which have been added; nothing: all of the sequence's
+    std::optional<core::TasksAdded> added;                 // once planned: what the core has not been told yet, in `tasks` from `next`
+    std::size_t next = 0;
+  };
+  void Plan(const CatalogueJob& job, std::optional<std::vector<store::FrameAdded>> frames = std::nullopt);
+  absl::Status Expand(Planning& planning);
   absl::Status NeedFrames(CatalogueSequence& sequence) const;
 
   store::Store& store_;
@@ -68,7 +76,7 @@ class Catalogue {
   std::map<std::pair<std::string, std::string>, std::string> sequence_by_name_;
   std::map<std::string, CatalogueJob> jobs_;
   std::vector<std::string> job_order_;
-  std::deque<std::string> unplanned_;  // restored jobs, most urgent first
+  std::deque<Planning> plannings_;  // most urgent first, and one job's in the order that they came
 };
 
 }  // namespace vorocast::server

@@ -16,7 +16,8 @@ namespace vorocast::server {
 namespace {
 
 constexpr std::size_t kQueueMax = 100'000;
-constexpr std::size_t kTurnMax = 4'000;  // commands a turn: answers do not wait for an endless queue
+/// So long a turn takes in commands: many share one commit, and an answer does not wait for an endless queue.
+constexpr auto kTurnTime = std::chrono::milliseconds(15);
 constexpr auto kTick = std::chrono::milliseconds(50);
 constexpr auto kCommitPauseFirst = std::chrono::milliseconds(20);
 constexpr auto kCommitPauseLast = std::chrono::milliseconds(500);
@@ -88,9 +89,11 @@ absl::Status Engine::Ask(Command command) {
   {
     const std::lock_guard lock(mutex_);
     if (!stalled_.ok()) return stalled_;
+    if (stopping_ || asked_.size() >= kQueueMax) return absl::UnavailableError("the scheduler is stopping or overloaded; try again");
+    asked_.push_back(std::move(command));
   }
-  if (Submit(std::move(command))) return absl::OkStatus();
-  return absl::UnavailableError("the scheduler is stopping or overloaded; try again");
+  wake_.notify_one();
+  return absl::OkStatus();
 }
 
 void Engine::Enqueue(Command command) {
@@ -101,27 +104,43 @@ void Engine::Enqueue(Command command) {
   wake_.notify_one();
 }
 
+Command Engine::Next() {
+  const std::lock_guard lock(mutex_);
+  // In turn, so that neither keeps the other waiting for long.
+  was_asked_ = !asked_.empty() && (!was_asked_ || commands_.empty());
+  std::deque<Command>& queue = was_asked_ ? asked_ : commands_;
+  if (queue.empty()) return nullptr;
+  Command next = std::move(queue.front());
+  queue.pop_front();
+  return next;
+}
+
 void Engine::Run() {
   auto next_tick = std::chrono::steady_clock::now();
   while (true) {
-    std::vector<Command> batch;
     {
       std::unique_lock lock(mutex_);
-      wake_.wait_until(lock, next_tick, [this] { return stopping_ || !commands_.empty(); });
-      if (stopping_ && commands_.empty()) return;
-      while (!commands_.empty() && batch.size() < kTurnMax) {
-        batch.push_back(std::move(commands_.front()));
-        commands_.pop_front();
-      }
+      wake_.wait_until(lock, next_tick, [this] { return stopping_ || !commands_.empty() || !asked_.empty(); });
+      if (stopping_ && commands_.empty() && asked_.empty()) return;
     }
     Turn turn(state_, MonotonicNow());
-    for (const Command& command : batch) command(turn);
+    const auto turn_ends = std::chrono::steady_clock::now() + kTurnTime;
+    bool drained = false;
+    while (std::chrono::steady_clock::now() < turn_ends) {
+      const Command command = Next();
+      drained = !command;
+      if (drained) break;
+      command(turn);
+    }
     // After the commands: a sign of life that waits in the queue must be seen before its lease is judged.
     if (std::chrono::steady_clock::now() >= next_tick) {
-      if (batch.size() < kTurnMax) turn.Apply(core::Tick{});
+      if (drained) turn.Apply(core::Tick{});
       next_tick = std::chrono::steady_clock::now() + kTick;
     }
-    adapters_.changed(turn, turn.changed_jobs_);
+    std::set<std::string> changed = std::exchange(changed_late_, {});
+    changed.merge(std::exchange(turn.changed_jobs_, {}));
+    adapters_.changed(turn, changed);
+    changed_late_ = std::exchange(turn.changed_jobs_, {});
     if (!Finish(turn).ok()) return;
   }
 }
@@ -142,8 +161,8 @@ void Engine::NoteStalled(Turn& turn, const absl::Status& status) {
     if (!stalled_.ok()) return;
     stalled_ = absl::Status(status.code(), fmt::format("the scheduler cannot write its state and waits: {}", std::string(status.message())));
   }
-  for (const auto& answer : std::exchange(turn.answers_, {})) answer(stalled_);
   if (adapters_.stalled) adapters_.stalled(stalled_);
+  for (const auto& answer : std::exchange(turn.answers_, {})) answer(stalled_);
 }
 
 absl::Status Engine::Commit(Turn& turn) {

@@ -51,7 +51,7 @@ struct EngineAdapters {
   /// Called on the engine's thread, after the commit; must not block.
   std::function<void(core::Message)> send;
   std::function<void(std::vector<core::LookUp>)> look_up;
-  /// Jobs that changed since the last turn; called on every turn, also with none.
+  /// Jobs that this turn's commands changed; called on every turn, also with none. What it changes itself belongs to the next turn's jobs.
   std::function<void(Turn&, const std::set<std::string>&)> changed;
   /// The store cannot be written for now; called on the engine's thread, once each time this begins.
   std::function<void(const absl::Status&)> stalled;
@@ -83,6 +83,8 @@ class Engine {
 
  private:
   void Run();
+  /// The next command; empty when none waits.
+  Command Next();
   /// When OK the turn's records are durable; an error is final.
   absl::Status Commit(Turn& turn);
   void NoteStalled(Turn& turn, const absl::Status& status);
@@ -93,8 +95,11 @@ class Engine {
   EngineAdapters adapters_;
   core::State state_;                         // the engine's thread, after Start
   std::vector<core::LookUp> early_look_ups_;  // from before Start
+  std::set<std::string> changed_late_;        // the engine's thread: since the last turn's adapters were told
   std::mutex mutex_;
   std::condition_variable wake_;
+  std::deque<Command> asked_;     // guarded by mutex_; somebody waits for these
+  bool was_asked_ = false;        // guarded by mutex_; the last command was one of them
   std::deque<Command> commands_;  // guarded by mutex_
   bool stopping_ = false;         // guarded by mutex_
   absl::Status stalled_;          // guarded by mutex_; why the store cannot be written, or OK

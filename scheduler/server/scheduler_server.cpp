@@ -54,7 +54,6 @@ struct SchedulerServer::Parts {
 
   absl::Status Restore();
   void StartEngine();
-  void PlanNext();
   ~Parts();
 };
 
@@ -76,17 +75,11 @@ void SchedulerServer::Parts::StartEngine() {
                 .look_up = [this](std::vector<core::LookUp> asked) { look_ups->Ask(std::move(asked)); },
                 .changed =
                     [this](Turn& turn, const std::set<std::string>& changed) {
+                      if (catalogue.PlanSome(turn)) engine.Enqueue([](Turn&) {});
                       watchers.Changed(turn, changed);
                       archive.Changed(turn, changed);
                     },
                 .stalled = [this](const absl::Status& why) { watchers.EndAll(why); }});
-  PlanNext();
-}
-
-void SchedulerServer::Parts::PlanNext() {
-  engine.Enqueue([this](Turn& turn) {
-    if (catalogue.PlanNext(turn)) turn.After([this] { PlanNext(); });
-  });
 }
 
 SchedulerServer::Parts::~Parts() {

@@ -65,8 +65,11 @@ class Farm {
     if (!status.ok()) Die(status);
     engine_.Start({.send = [this](core::Message message) { Receive(std::move(message)); },
                    .look_up = [this](std::vector<core::LookUp> asked) { LookUp(std::move(asked)); },
-                   .changed = [this](server::Turn& turn, const std::set<std::string>& changed) { archive_.Changed(turn, changed); }});
-    PlanNext();
+                   .changed =
+                       [this](server::Turn& turn, const std::set<std::string>& changed) {
+                         if (catalogue_.PlanSome(turn)) engine_.Enqueue([](server::Turn&) {});
+                         archive_.Changed(turn, changed);
+                       }});
     thread_ = std::thread([this] { Work(); });
   }
   ~Farm() {
@@ -132,7 +135,7 @@ class Farm {
     std::mutex mutex;
     std::condition_variable ended;
     bool over = false;
-    engine_.Enqueue([&](server::Turn& turn) {
+    const absl::Status accepted = engine_.Ask([&](server::Turn& turn) {
       work(turn);
       turn.After([&] {
         const std::lock_guard lock(mutex);
@@ -140,13 +143,9 @@ class Farm {
         ended.notify_all();
       });
     });
+    if (!accepted.ok()) Die(accepted);
     std::unique_lock lock(mutex);
     ended.wait(lock, [&] { return over; });
-  }
-  void PlanNext() {
-    engine_.Enqueue([this](server::Turn& turn) {
-      if (catalogue_.PlanNext(turn)) turn.After([this] { PlanNext(); });
-    });
   }
   void Receive(core::Message message) {
     const std::lock_guard lock(mutex_);

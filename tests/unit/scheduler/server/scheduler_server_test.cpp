@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <fstream>
 #include <map>
 
 #include <fmt/format.h>
@@ -266,7 +267,70 @@ TEST_F(SchedulerServerTest, CancelAndRetry) {
   EXPECT_TRUE(Await([&] { return Get(job->id())->state() == v1::CANCELLED; }));
   EXPECT_EQ(Get(job->id())->stages(0).done(), 6);
   worker_->Release();
-  EXPECT_EQ((Call<v1::Jobs::StubInterface>(*jobs_, &v1::Jobs::StubInterface::Retry, request)->state()), v1::RUNNING);
+  // The job had ended and is planned anew, which the answer does not wait for.
+  EXPECT_EQ((Call<v1::Jobs::StubInterface>(*jobs_, &v1::Jobs::StubInterface::Retry, request)->state()), v1::BLOCKED);
+  EXPECT_EQ(WatchToEnd(job->id())->state(), v1::DONE);
+  EXPECT_EQ(worker_->executed()["frame 0: tessellate"], 1);
+}
+
+TEST_F(SchedulerServerTest, AnEndedJobIsShownFromTheRecordAfterARestart) {
+  StartWorker({.fails = [](const std::string& label) { return label == "frame 2: tessellate" ? "3 normals are not finite" : ""; }});
+  const auto sequence = Open();
+  const auto job = Submit(sequence->id());
+  ASSERT_TRUE(AddFrames(sequence->id(), 0, 6).ok());
+  ASSERT_TRUE(Close(sequence->id()).ok());
+  const auto ended = WatchToEnd(job->id());
+  ASSERT_EQ(ended->state(), v1::DONE);
+  server_.reset();
+  StartScheduler();
+  EXPECT_EQ(Get(job->id())->SerializeAsString(), ended->SerializeAsString());
+  EXPECT_EQ(WatchToEnd(job->id())->outputs_size(), ended->outputs_size());
+  EXPECT_EQ(*Fetch(job->id(), "tracked.h5"), "assemble");
+  EXPECT_EQ(Fetch(job->id(), "nothing.h5").status().code(), absl::StatusCode::kNotFound);
+  EXPECT_THAT(Explain(job->id(), ""), HasSubstr("done"));
+  EXPECT_THAT(Explain(job->id(), "frame 2: tessellate"), HasSubstr("not finite"));
+  // Another job on the take is planned from the frames on record, and reuses everything that could be made.
+  const auto again = WatchToEnd(Submit(sequence->id())->id());
+  EXPECT_EQ(again->state(), v1::DONE);
+  EXPECT_EQ(worker_->executed()["frame 1: tessellate"], 1);
+}
+
+TEST_F(SchedulerServerTest, ARetryMakesLostAndDamagedResultsAgain) {
+  StartWorker();
+  const auto sequence = Open();
+  const auto job = Submit(sequence->id());
+  ASSERT_TRUE(AddFrames(sequence->id(), 0, 6).ok());
+  ASSERT_TRUE(Close(sequence->id()).ok());
+  const auto ended = WatchToEnd(job->id());
+  ASSERT_EQ(ended->state(), v1::DONE);
+  const auto path_of = [&](const std::string& name) {
+    for (const v1::Output& output : ended->outputs()) {
+      if (output.name() == name) return artifacts_->ArtifactPath(*base::Digest::FromHex(output.key()), ".h5");
+    }
+    return std::filesystem::path();
+  };
+  std::filesystem::remove(path_of("cells/frame_000001.h5"));
+  std::filesystem::permissions(path_of("tracked.h5"), std::filesystem::perms::owner_all);
+  std::ofstream(path_of("tracked.h5")) << "Assemble";  // as long as before
+  const auto retry = [&] {
+    v1::JobRequest request;
+    request.set_job_id(job->id());
+    return Call<v1::Jobs::StubInterface>(*jobs_, &v1::Jobs::StubInterface::Retry, request);
+  };
+  ASSERT_TRUE(retry().ok());
+  EXPECT_EQ(WatchToEnd(job->id())->state(), v1::DONE);
+  EXPECT_EQ(worker_->executed()["frame 1: tessellate"], 2);
+  EXPECT_EQ(worker_->executed()["assemble"], 2);
+  EXPECT_EQ(worker_->executed()["frame 0: tessellate"], 1);
+  EXPECT_EQ(*Fetch(job->id(), "tracked.h5"), "assemble");
+  EXPECT_TRUE(std::filesystem::exists(path_of("tracked.h5").string() + ".damaged"));
+
+  // The same for a job that only the record knows.
+  server_.reset();
+  StartScheduler();
+  std::filesystem::remove(path_of("cells/frame_000003.h5"));
+  ASSERT_TRUE(retry().ok());
+  ASSERT_TRUE(Await([&] { return worker_->executed()["frame 3: tessellate"] == 2; }));
   EXPECT_EQ(WatchToEnd(job->id())->state(), v1::DONE);
   EXPECT_EQ(worker_->executed()["frame 0: tessellate"], 1);
 }
