@@ -17,7 +17,7 @@ packages=(
   # peers that benchmarks measure beside
   voro++-dev libceres-dev
   # tests, benchmarks, checks
-  postgresql postgresql-client libgtest-dev libgmock-dev python3 python3-h5py libassimp-dev clang-format-14 clang-tidy-14
+  postgresql postgresql-client slurmctld slurmd slurm-client munge libgtest-dev libgmock-dev python3 python3-h5py libassimp-dev clang-format-14 clang-tidy-14
 )
 
 missing=()

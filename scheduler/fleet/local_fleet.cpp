@@ -82,6 +82,12 @@ LocalFleet::~LocalFleet() {
   StopMembers();
 }
 
+std::string LocalFleet::Describe() const {
+  const std::lock_guard lock(mutex_);
+  const auto running = std::count_if(kept_.begin(), kept_.end(), [](const Kept& kept) { return kept.process.pid > 0; });
+  return fmt::format("this machine: {} of {} processes run", running, kept_.size());
+}
+
 void LocalFleet::Adopt() {
   for (auto& [name, recorded] : ReadFile(options_.state / "fleet.json")) {
     if (!IsAlive(recorded.process)) continue;

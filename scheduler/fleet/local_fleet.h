@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "absl/time/time.h"
+#include "scheduler/fleet/fleet.h"
 #include "scheduler/fleet/process.h"
 #include "services/base/status.h"
 
@@ -30,11 +31,13 @@ struct FleetOptions {
 
 /// The workers of one machine. They go on when this process is killed, and a fleet started afterwards on the same state folder takes them
 /// up again instead of starting a second set. A member that ends is started again, the later the more often it ends soon after its start.
-class LocalFleet {
+class LocalFleet final : public Fleet {
  public:
   static absl::StatusOr<std::unique_ptr<LocalFleet>> Start(FleetOptions options);
   /// Stops every member.
-  ~LocalFleet();
+  ~LocalFleet() override;
+
+  std::string Describe() const override;
 
   /// How many members were found running at the start.
   std::size_t adopted() const { return adopted_; }
@@ -56,10 +59,10 @@ class LocalFleet {
   void StopMembers();
 
   FleetOptions options_;
-  std::vector<Kept> kept_;      // the watching thread's, once it runs
+  std::vector<Kept> kept_;      // guarded by mutex_, once the watching thread runs
   std::vector<ProcessId> old_;  // found running, but no longer wanted
   std::size_t adopted_ = 0;
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   std::condition_variable wake_;
   bool stopping_ = false;  // guarded by mutex_
   std::thread thread_;

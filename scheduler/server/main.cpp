@@ -16,7 +16,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include "scheduler/fleet/local_fleet.h"
+#include "scheduler/fleet/fleet_flags.h"
 #include "scheduler/server/scheduler_server.h"
 #include "scheduler/server/standby.h"
 #include "scheduler/store/postgres_store.h"
@@ -29,8 +29,7 @@ struct Options {
   std::string state;
   std::string database;
   std::string listen;
-  std::int32_t workers = 0;
-  bool simulation = false;
+  fleet::FleetFlags fleet;
 };
 
 constexpr std::size_t kUnixPathMax = 107;
@@ -91,21 +90,14 @@ absl::Status Serve(const Options& options, const sigset_t& stop_signals) {
     if (!address) return absl::OkStatus();
     ASSIGN_OR_RETURN(server, SchedulerServer::Start({.state = state, .listen = *address}, std::move(store)));
   }
-  std::unique_ptr<fleet::LocalFleet> fleet;
-  if (options.workers > 0 || options.simulation) {
-    const std::filesystem::path programs = std::filesystem::read_symlink("/proc/self/exe").parent_path();
-    fleet::FleetOptions members{
-        .state = state,
-        .members =
-            fleet::Members({.programs = programs, .scheduler = server->address(), .workers = options.workers, .simulation = options.simulation})};
-    ASSIGN_OR_RETURN(fleet, fleet::LocalFleet::Start(std::move(members)));
-  }
+  ASSIGN_OR_RETURN(std::vector<std::unique_ptr<fleet::Fleet>> fleets,
+                   options.fleet.Start(state, server->address(), [raw = server.get()] { return raw->Demand(); }));
   RETURN_IF_ERROR(Announce(state, server->address()));
   spdlog::info("serving: address={} state={} pid={}", server->address(), state.string(), getpid());
   int signal = 0;
   sigwait(&stop_signals, &signal);
   spdlog::info("stopping: signal={}", signal);
-  fleet.reset();
+  fleets.clear();
   server.reset();
   std::error_code ignored;
   if (!StableAddress(state).starts_with("127.")) std::filesystem::remove(state / "scheduler.json", ignored);
@@ -114,6 +106,7 @@ absl::Status Serve(const Options& options, const sigset_t& stop_signals) {
 }
 
 absl::Status Validate(const Options& options) {
+  RETURN_IF_ERROR(options.fleet.Validate(options.listen));
   if (options.database.empty() || !options.listen.empty()) return absl::OkStatus();
   return absl::InvalidArgumentError("--database needs --listen HOST:PORT: a scheduler that stands by has an address of its own");
 }
@@ -134,8 +127,7 @@ int Main(int argc, char** argv) {
                  "postgresql://USER@HOST/NAME (default: SQLite in the state folder). Several schedulers may name one database and share the state "
                  "folder: one leads, the others stand by. The password comes from ~/.pgpass or PGPASSWORD");
   app.add_option("--listen", options.listen, "HOST:PORT or unix:/path (default: a socket in the state folder)");
-  app.add_option("--workers", options.workers, "Workers to run on this machine")->check(CLI::Range(0, 1024));
-  app.add_flag("--simulation", options.simulation, "Run a simulation service on this machine too");
+  options.fleet.AddTo(app);
   CLI11_PARSE(app, argc, argv);
 
   absl::Status status = Validate(options);

@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "scheduler/server/scheduler_server.h"
 
+#include <chrono>
 #include <cstdlib>
+#include <future>
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include "scheduler/server/archive.h"
 #include "scheduler/server/captures_service.h"
+#include "scheduler/server/demand.h"
 #include "scheduler/server/dispatch_service.h"
 #include "scheduler/server/jobs_service.h"
 #include "scheduler/server/leadership_watch.h"
@@ -20,6 +23,7 @@ namespace {
 
 constexpr int kDiskThreads = 4;
 constexpr absl::Duration kStopGrace = absl::Seconds(1);
+constexpr auto kDemandPatience = std::chrono::seconds(10);
 
 void EndProcess(const absl::Status& why) {
   const bool fenced = absl::IsFailedPrecondition(why);
@@ -98,6 +102,14 @@ SchedulerServer::SchedulerServer(std::unique_ptr<Parts> parts) : parts_(std::mov
 SchedulerServer::~SchedulerServer() = default;
 
 const std::string& SchedulerServer::address() const { return parts_->server->address(); }
+
+absl::StatusOr<fleet::Demand> SchedulerServer::Demand() const {
+  const auto promise = std::make_shared<std::promise<fleet::Demand>>();
+  std::future<fleet::Demand> demand = promise->get_future();
+  RETURN_IF_ERROR(parts_->engine.Ask([promise](Turn& turn) { promise->set_value(DemandOf(turn.state())); }));
+  if (demand.wait_for(kDemandPatience) == std::future_status::ready) return demand.get();
+  return absl::UnavailableError("the scheduler has been too busy to say what is left to do");
+}
 
 absl::StatusOr<std::unique_ptr<SchedulerServer>> SchedulerServer::Start(const SchedulerOptions& options) {
   std::error_code error;

@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 
+#include "scheduler/fleet/sizing.h"
 #include "scheduler/store/store.h"
 #include "services/base/status.h"
 
@@ -33,6 +34,8 @@ class SchedulerServer {
   ~SchedulerServer();
 
   const std::string& address() const;
+  /// What is left to do, for whoever provides workers. From any thread; UNAVAILABLE while the store cannot be written, or when it takes too long.
+  absl::StatusOr<fleet::Demand> Demand() const;
 
  private:
   struct Parts;

@@ -131,6 +131,8 @@ v1::Finished Attempt::RunSpec(const tasks::TaskSpec& spec) {
       if (RanOutOfMemory(*end)) {
         return Fail(v1::Failed::OUT_OF_MEMORY, fmt::format("needs more memory than its limit of {} MiB", lease_.memory_limit() >> 20), end->seconds);
       }
+      // A cluster that takes its machine back tells every process of a worker at once.
+      if (end->code == SIGTERM) return Fail(v1::Failed::DRAINED, "ended by SIGTERM from outside", end->seconds);
       return Fail(v1::Failed::CRASHED, CrashMessage(*end), end->seconds);
     case ChildEnd::How::kExited:
       break;

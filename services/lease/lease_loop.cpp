@@ -71,9 +71,7 @@ class Deadline {
 class LeaseLoop {
  public:
   LeaseLoop(const LeaseLoopOptions& options, const std::vector<tasks::Kind>& kinds)
-      : options_(options),
-        name_(options.name.empty() ? DefaultName() : options.name),
-        kinds_(kinds) {
+      : options_(options), name_(options.name.empty() ? DefaultName() : options.name), kinds_(kinds) {
     for (const std::string& address : rpc::SplitAddresses(options.scheduler))
       schedulers_.push_back({address, v1::Dispatch::NewStub(rpc::Connect(address))});
   }
@@ -91,6 +89,7 @@ class LeaseLoop {
     }
     return SayFarewell();
   }
+  const LeaseLoopSummary& summary() const { return summary_; }
 
  private:
   // Timers.
@@ -246,6 +245,7 @@ class LeaseLoop {
   }
 
   void Conclude(v1::Finished finished) {
+    if (finished.failed().cause() == v1::Failed::DRAINED) ++summary_.given_back;
     const AttemptKey key = KeyOf(finished.id());
     SendReport(reports_.insert_or_assign(key, std::move(finished)).first->second);
   }
@@ -273,6 +273,7 @@ class LeaseLoop {
   // Leaving.
 
   void On(DrainRequested&) {
+    summary_.told_to_stop = true;
     if (draining_) {
       // Asked again: stop now.
       drain_.Set(absl::ZeroDuration());
@@ -327,7 +328,7 @@ class LeaseLoop {
   const Scheduler& scheduler() const { return schedulers_[scheduler_]; }
   std::vector<Scheduler> schedulers_;
   std::size_t scheduler_ = 0;  // the one in use
-  EventQueue events_;  // outlives everything below, which pushes to it
+  EventQueue events_;          // outlives everything below, which pushes to it
 
   absl::StatusOr<storage::ArtifactStore> store_ = absl::UnavailableError("the scheduler has not said yet where the artifact folder is");
   std::map<AttemptKey, v1::Lease> waiting_;
@@ -340,6 +341,7 @@ class LeaseLoop {
   bool welcomed_ = false;
   bool lost_ = false;  // said so already
   bool draining_ = false;
+  LeaseLoopSummary summary_;
   absl::Duration backoff_ = kReconnectFirst;
   Deadline reconnect_, welcome_, away_, heartbeat_, drain_, farewell_;
 };
@@ -356,9 +358,12 @@ absl::Status Validate(const LeaseLoopOptions& options) {
 
 }  // namespace
 
-absl::Status RunLeaseLoop(const LeaseLoopOptions& options, const std::vector<tasks::Kind>& kinds) {
+absl::Status RunLeaseLoop(const LeaseLoopOptions& options, const std::vector<tasks::Kind>& kinds, LeaseLoopSummary* summary) {
   RETURN_IF_ERROR(Validate(options));
-  return LeaseLoop(options, kinds).Run();
+  LeaseLoop loop(options, kinds);
+  const absl::Status status = loop.Run();
+  if (summary) *summary = loop.summary();
+  return status;
 }
 
 }  // namespace vorocast::lease

@@ -26,9 +26,18 @@ struct LeaseLoopOptions {
   absl::Duration drain_time = absl::Seconds(30);          // after SIGTERM, what still runs then is given back
 };
 
+/// How it came to an end.
+struct LeaseLoopSummary {
+  bool told_to_stop = false;    // by a signal, rather than because the scheduler was away
+  std::int32_t given_back = 0;  // tasks that had not ended
+};
+
 /// Takes leases until told to stop (SIGTERM or SIGINT drains), each task in a child process with its memory and time limits.
 /// proto/dispatch.proto tells the protocol. Returns when drained.
-absl::Status RunLeaseLoop(const LeaseLoopOptions& options, const std::vector<tasks::Kind>& kinds);
+absl::Status RunLeaseLoop(const LeaseLoopOptions& options, const std::vector<tasks::Kind>& kinds, LeaseLoopSummary* summary = nullptr);
+
+/// The exit code of a worker that was told to stop with work left: whoever provides it may start it again elsewhere.
+inline constexpr int kWorkLeft = 75;
 
 /// What `program execute-task` does: reads one task from standard input, runs its executor, writes progress and the outcome to standard output.
 /// Returns the process's exit code.

@@ -18,7 +18,8 @@ namespace {
 constexpr char kStory[] =
     "Takes tasks from a Vorocast scheduler and runs each in a process of its own, with its memory and time limits.\n"
     "Results go to the shared artifact folder that the scheduler names. When the scheduler is away, the worker goes on with\n"
-    "what it holds and connects again. SIGTERM or Ctrl-C lets it finish what runs and leave; a second one stops at once.";
+    "what it holds and connects again. SIGTERM or Ctrl-C lets it finish what runs and leave; a second one stops at once.\n"
+    "It exits with code 75 when it had to give tasks back then, so that a cluster may start it again elsewhere.";
 
 }  // namespace
 
@@ -40,7 +41,9 @@ int main(int argc, char** argv) {
   flags.Apply(options);
   std::vector<tasks::Kind> kinds;
   for (const auto& executor : executors) kinds.push_back(executor->kind());
-  const absl::Status status = lease::RunLeaseLoop(options, kinds);
+  lease::LeaseLoopSummary summary;
+  const absl::Status status = lease::RunLeaseLoop(options, kinds, &summary);
+  if (summary.told_to_stop && summary.given_back > 0) return lease::kWorkLeft;
   if (status.ok()) return EXIT_SUCCESS;
   fmt::print(stderr, "vorocast-worker: {}\n", std::string(status.message()));
   return EXIT_FAILURE;
