@@ -27,6 +27,7 @@ struct PoseTrack {
   std::vector<FrameState> state;            // [F]
   std::vector<double> residual;             // [F] root mean square point-to-plane distance of the associated surface points, metres
   std::vector<double> confidence;           // [F] fraction of the surface points that found a compatible partner within 2 σ, 0 … 1
+  std::vector<Rigid3> cell_pose;            // [F*n] world_from_template of the template's cells; empty where they go with their patches
 
   const Rigid3& Pose(std::size_t f, std::size_t p) const { return world_from_template[f * static_cast<std::size_t>(patch_count) + p]; }
   Rigid3& Pose(std::size_t f, std::size_t p) { return world_from_template[f * static_cast<std::size_t>(patch_count) + p]; }

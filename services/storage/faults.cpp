@@ -155,6 +155,8 @@ std::string FaultIn(const geometry::PoseTrack& track) {
   if (finder.found()) return finder.fault();
   finder.Size(track.world_from_template.size(), frames * static_cast<std::size_t>(track.patch_count), "/patches/rotation");
   finder.Poses(track.world_from_template, "/patches/rotation", "/patches/translation");
+  finder.Require(track.cell_pose.empty() || track.cell_pose.size() % frames == 0, "/cells/rotation", "has not as many cells in every frame");
+  finder.Poses(track.cell_pose, "/cells/rotation", "/cells/translation");
   return finder.fault();
 }
 

@@ -60,12 +60,19 @@ absl::Status WritePoseTrack(const std::filesystem::path& path, const PoseTrack& 
   Hdf5Writer writer(path);
   WriteRoot(writer, kPosesContent, provenance);
   WritePoseTrackLayout(writer, track);
+  if (!track.cell_pose.empty()) {
+    writer.Group("/cells");
+    WritePoses(writer, "/cells", {track.frames.size(), track.cell_pose.size() / track.frames.size()}, track.cell_pose);
+  }
   return writer.Finish();
 }
 
 absl::StatusOr<PoseTrack> ReadPoseTrack(const std::filesystem::path& path) {
   ASSIGN_OR_RETURN(const Hdf5Reader reader, OpenArtifact(path, kPosesContent));
   ASSIGN_OR_RETURN(PoseTrack track, ReadPoseTrackLayout(reader));
+  if (reader.Has("/cells")) {
+    ASSIGN_OR_RETURN(track.cell_pose, ReadPoses(reader, "/cells", {static_cast<std::int64_t>(track.frames.size()), kAny}));
+  }
   if (const std::string fault = FaultIn(track); !fault.empty()) return reader.Wrong("values", fault);
   return track;
 }

@@ -25,7 +25,8 @@ absl::Status ValidateWindows(const geometry::Template& model, const std::vector<
       return absl::InvalidArgumentError(fmt::format("a window has {} patches, the template {}", window.patch_count, model.patch_count));
     }
     if (count == 0 || window.state.size() != count || window.residual.size() != count || window.confidence.size() != count ||
-        window.world_from_template.size() != count * static_cast<std::size_t>(window.patch_count)) {
+        window.world_from_template.size() != count * static_cast<std::size_t>(window.patch_count) ||
+        (!window.cell_pose.empty() && window.cell_pose.size() != count * model.cells.size())) {
       return absl::InvalidArgumentError("a window's arrays do not all have one entry for each of its frames");
     }
     if (!std::ranges::is_sorted(window.frames))
@@ -53,16 +54,23 @@ std::map<std::int32_t, std::vector<Vote>> VotesByFrame(const std::vector<PoseTra
   return votes;
 }
 
-/// Blends the windows' poses of one frame into row f of the track.
-void BlendVotes(const std::vector<Vec3>& centres, const std::vector<PoseTrack>& windows, const std::vector<Vote>& votes, std::size_t f,
-                PoseTrack& track) {
+/// Blends the windows' poses of one frame into row f of the track: of patches and of cells.
+void BlendVotes(const std::vector<Vec3>& centres, const CellBlending& blending, const std::vector<Vec3>& centroids,
+                const std::vector<PoseTrack>& windows, const std::vector<Vote>& votes, std::size_t f, PoseTrack& track) {
+  const auto blend = [](const Vec3& centre, Rigid3& into, const Rigid3& pose, double share) {
+    into = share == 1 ? pose : InterpolateAbout(centre, into, pose, share);
+  };
+  const std::size_t n = centroids.size();
   double total = 0;
   for (const Vote& vote : votes) {
     total += vote.weight;
     const double share = vote.weight / total;  // the running mean: after the last vote each has its weight
     const PoseTrack& window = windows[vote.window];
-    for (std::size_t p = 0; p < centres.size(); ++p) {
-      track.Pose(f, p) = share == 1 ? window.Pose(vote.row, p) : InterpolateAbout(centres[p], track.Pose(f, p), window.Pose(vote.row, p), share);
+    for (std::size_t p = 0; p < centres.size(); ++p) blend(centres[p], track.Pose(f, p), window.Pose(vote.row, p), share);
+    for (std::size_t c = 0; c < n; ++c) {
+      // A window of patches alone, such as the guide's: its cells go with them.
+      const Rigid3 pose = window.cell_pose.empty() ? blending.Blend(c, &window.Pose(vote.row, 0)) : window.cell_pose[vote.row * n + c];
+      blend(centroids[c], track.cell_pose[f * n + c], pose, share);
     }
     track.residual[f] += share * (window.residual[vote.row] - track.residual[f]);
     track.confidence[f] += share * (window.confidence[vote.row] - track.confidence[f]);
@@ -71,27 +79,23 @@ void BlendVotes(const std::vector<Vec3>& centres, const std::vector<PoseTrack>& 
 }
 
 /// A quaternion and its negative are one rotation: consecutive frames keep to one side, so that whoever interpolates them takes the short way.
-void AlignSigns(PoseTrack& track) {
-  for (std::size_t f = 1; f < track.frames.size(); ++f) {
-    for (std::size_t p = 0; p < static_cast<std::size_t>(track.patch_count); ++p) {
-      geometry::Quat& q = track.Pose(f, p).rotation;
-      if (q.dot(track.Pose(f - 1, p).rotation) < 0) q.coeffs() *= -1;
-    }
+void AlignSigns(std::size_t frames, std::vector<Rigid3>& poses) {
+  const std::size_t row = poses.size() / frames;
+  for (std::size_t i = row; i < poses.size(); ++i) {
+    geometry::Quat& q = poses[i].rotation;
+    if (q.dot(poses[i - row].rotation) < 0) q.coeffs() *= -1;
   }
 }
 
-void BlendCells(geometry::TrackedTake& take) {
-  const CellBlending blending(take.model.cells, take.model.patch, take.model.patch_count);
-  const std::size_t n = take.cell_count();
-  take.cell_rotation.reserve(take.frame_count() * n);
-  take.cell_translation.reserve(take.frame_count() * n);
-  for (std::size_t f = 0; f < take.frame_count(); ++f) {
-    for (std::size_t c = 0; c < n; ++c) {
-      const Rigid3 pose = blending.Blend(c, &take.patches.Pose(f, 0));
-      take.cell_rotation.push_back(Eigen::Vector4d(pose.rotation.w(), pose.rotation.x(), pose.rotation.y(), pose.rotation.z()).cast<float>());
-      take.cell_translation.push_back(pose.translation);
-    }
+/// Moves the cells' poses from the track to where the take keeps them.
+void StoreCells(geometry::TrackedTake& take) {
+  take.cell_rotation.reserve(take.patches.cell_pose.size());
+  take.cell_translation.reserve(take.patches.cell_pose.size());
+  for (const Rigid3& pose : take.patches.cell_pose) {
+    take.cell_rotation.push_back(Eigen::Vector4d(pose.rotation.w(), pose.rotation.x(), pose.rotation.y(), pose.rotation.z()).cast<float>());
+    take.cell_translation.push_back(pose.translation);
   }
+  take.patches.cell_pose = {};
 }
 
 }  // namespace
@@ -116,7 +120,9 @@ absl::StatusOr<geometry::TrackedTake> Assemble(const geometry::Template& model, 
   track.state.assign(track.frames.size(), FrameState::kInterpolated);
   track.residual.assign(track.frames.size(), 0);
   track.confidence.assign(track.frames.size(), 0);
+  track.cell_pose.resize(track.frames.size() * model.cells.size());
 
+  const CellBlending blending(model.cells, model.patch, model.patch_count);
   const std::vector<Vec3> centres = PatchCentres(model.cells, model.patch, model.patch_count);
   const auto votes = VotesByFrame(windows);
   std::vector<std::int32_t> missing;
@@ -125,7 +131,7 @@ absl::StatusOr<geometry::TrackedTake> Assemble(const geometry::Template& model, 
     if (found == votes.end()) {
       missing.push_back(track.frames[f]);
     } else {
-      BlendVotes(centres, windows, found->second, f, track);
+      BlendVotes(centres, blending, model.cells.centroid, windows, found->second, f, track);
     }
   }
   if (std::ssize(missing) > options.interpolated_max) {
@@ -133,9 +139,10 @@ absl::StatusOr<geometry::TrackedTake> Assemble(const geometry::Template& model, 
         fmt::format("assemble: {} of {} frames could not be tracked, more than the {} that may be interpolated: frames {}", missing.size(),
                     track.frames.size(), options.interpolated_max, fmt::join(missing, ", ")));
   }
-  RETURN_IF_ERROR(base::Annotate(FillUntracked(centres, track), "assemble"));
-  AlignSigns(track);
-  BlendCells(take);
+  RETURN_IF_ERROR(base::Annotate(FillUntracked(centres, model.cells.centroid, track), "assemble"));
+  AlignSigns(track.frames.size(), track.world_from_template);
+  AlignSigns(track.frames.size(), track.cell_pose);
+  StoreCells(take);
   return take;
 }
 

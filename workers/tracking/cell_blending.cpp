@@ -71,4 +71,14 @@ Rigid3 CellBlending::Blend(std::size_t cell, const Rigid3* patch_pose) const {
   return {blended, posed - blended * centroid};
 }
 
+AffineNode CellBlending::Blend(std::size_t cell, const std::vector<Vec3>& centre, const Deformation& nodes) const {
+  AffineNode blended{Vec3::Zero(), geometry::Mat3::Zero()};
+  for (std::int32_t i = offset_[cell]; i < offset_[cell + 1]; ++i) {
+    const auto& [node, weight] = shares_[i];
+    blended.position += weight * (nodes[node].position + nodes[node].gradient * (centroid_[cell] - centre[node]));
+    blended.gradient += weight * nodes[node].gradient;
+  }
+  return blended;
+}
+
 }  // namespace vorocast::tracking

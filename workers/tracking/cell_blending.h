@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "workers/tracking/elastic_fit.h"
 #include "workers/tracking/patch_model.h"
 
 namespace vorocast::tracking {
@@ -16,6 +17,9 @@ class CellBlending {
   /// The cell's pose: its rotation is the weighted mean of the patches' (as unit quaternions), and its centroid lies at the weighted mean of where
   /// the patches carry it.
   geometry::Rigid3 Blend(std::size_t cell, const geometry::Rigid3* patch_pose) const;
+
+  /// The cell's map out of those of the nodes: `centre` holds where the nodes' maps have their centres. Its position is that of the cell's centroid.
+  AffineNode Blend(std::size_t cell, const std::vector<geometry::Vec3>& centre, const Deformation& nodes) const;
 
  private:
   struct Share {

@@ -13,9 +13,23 @@ namespace {
 
 constexpr double kSigmaStartM = 0.030;
 constexpr double kSigmaEndM = 0.012;
-constexpr double kRegulariser = 0.3;
-constexpr double kFromLastFrame = 0.8;
+// Ten times that of windows: patches should go on as they lay in the last frame, and what bends, bends after that.
+constexpr double kRegulariser = 3;
 constexpr std::size_t kPointsCompared = 1500;
+constexpr int kElasticSteps = 8;
+constexpr double kElasticSigmaStartM = 0.010;
+constexpr double kElasticSigmaEndM = 0.005;
+
+/// Twice as many points as the rigid patches have: it is their small relief that counts.
+std::vector<ElasticStage> ElasticStages(const GuideOptions& options, std::size_t points) {
+  std::vector<ElasticStage> stages(kElasticSteps);
+  for (int i = 0; i < kElasticSteps; ++i) {
+    stages[i].sigma_m = kElasticSigmaStartM * std::pow(kElasticSigmaEndM / kElasticSigmaStartM, i / (kElasticSteps - 1.0));
+    stages[i].stride = std::max<std::size_t>(1, points / static_cast<std::size_t>(2 * options.points));
+    stages[i].phase = static_cast<std::size_t>(i) % stages[i].stride;
+  }
+  return stages;
+}
 
 }  // namespace
 
@@ -34,17 +48,34 @@ FitStage GuideStage(const GuideOptions& options, std::int32_t iteration, std::si
 }
 
 Follower::Follower(const PatchModel& model, FrameFit& fit, const GuideOptions& options, std::int32_t frame, Pose pose)
-    : model_(model), fit_(fit), options_(options), now_frame_(frame), now_(std::move(pose)) {}
+    : model_(model),
+      fit_(fit),
+      elastic_(model),
+      options_(options),
+      now_frame_(frame),
+      now_(std::move(pose)),
+      deformation_(DeformationOf(model, now_)) {}
 
 const Pose& Follower::Follow(std::int32_t frame, const ObservedFrame& observed) {
   Pose pose = Start(frame, observed);
-  const std::vector<Relation> reference = Reference();
+  const std::vector<Relation> reference = RelationsOf(model_, now_);
   for (std::int32_t i = 0; i < options_.iterations; ++i) fit_.Step(observed, GuideStage(options_, i, observed.position.size()), reference, pose);
+  Deform(observed, pose);
   before_frame_ = now_frame_;
   before_ = std::move(now_);
   now_frame_ = frame;
-  now_ = std::move(pose);
+  now_ = PoseOf(model_, deformation_);
   return now_;
+}
+
+/// Moves the last frame's deformation as the patches went, and fits it.
+void Follower::Deform(const ObservedFrame& observed, const Pose& found) {
+  for (std::int32_t k = 0; k < model_.patch_count; ++k) {
+    const geometry::Rigid3 moved = found[k] * now_[k].Inverse();
+    deformation_[k].position = moved * deformation_[k].position;
+    deformation_[k].gradient = moved.rotation * deformation_[k].gradient;
+  }
+  elastic_.Run(observed, ElasticStages(options_, observed.position.size()), deformation_);
 }
 
 /// The last pose, or the one that goes on as the last two went: whichever explains the points better.
@@ -58,16 +89,6 @@ Pose Follower::Start(std::int32_t frame, const ObservedFrame& observed) {
   stage.phase = 0;
   const double still = fit_.Measure(observed, stage, now_).squared_mean;
   return fit_.Measure(observed, stage, moved).squared_mean < still ? moved : now_;
-}
-
-/// Neighbouring patches should lie nearly as in the last frame, drawn a little towards the template, lest errors add up.
-std::vector<Relation> Follower::Reference() const {
-  std::vector<Relation> reference = RelationsOf(model_, now_);
-  for (Relation& relation : reference) {
-    relation.matrix = kFromLastFrame * relation.matrix + (1 - kFromLastFrame) * geometry::Mat3::Identity();
-    relation.offset *= kFromLastFrame;
-  }
-  return reference;
 }
 
 absl::Status ValidateGuide(const std::vector<Observation>& frames, const GuideOptions& options) {

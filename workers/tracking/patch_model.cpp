@@ -42,7 +42,7 @@ std::vector<PatchMoments> MomentsOfPatches(const geometry::Cells& cells, const s
 
 /// Adds the edge (k, l) with its cells counted `share` times.
 void AddEdge(std::int32_t k, std::int32_t l, double share, const std::vector<PatchMoments>& moments, PatchModel& model) {
-  PatchEdge edge{k, l, moments[k].mass + moments[l].mass, Vec3::Zero(), Mat3::Zero()};
+  PatchEdge edge{k, l, share, moments[k].mass + moments[l].mass, Vec3::Zero(), Mat3::Zero()};
   edge.mean = (moments[k].mass * model.centre[k] + moments[l].mass * model.centre[l]) / edge.mass;
   for (const std::int32_t side : {k, l}) {
     const Vec3 arm = model.centre[side] - edge.mean;
@@ -125,6 +125,7 @@ PatchModel BuildPatchModel(const geometry::Cells& cells, const std::vector<std::
   model.patch_count = patch_count;
   model.centre = PatchCentres(cells, patch, patch_count);
   const std::vector<PatchMoments> moments = MomentsOfPatches(cells, patch, model.centre);
+  for (const PatchMoments& m : moments) model.covariance.push_back(m.covariance);
   for (const auto& [k, l] : PatchPairs(cells, patch)) AddEdge(k, l, 1, moments, model);
   AddTethers(moments, model);
   model.surface = SampleTemplateSurface(cells, patch, kFineSpacingM);

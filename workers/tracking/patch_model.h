@@ -18,6 +18,7 @@ struct SurfaceSample {
   geometry::Vec3 position;
   geometry::Vec3 normal;  // outward, unit, averaged over the vicinity
   std::int32_t patch = 0;
+  std::int32_t cell = 0;
 };
 
 /// A cell's centroid, where observed inner points may be associated.
@@ -31,6 +32,7 @@ struct InnerSample {
 struct PatchEdge {
   std::int32_t k = 0;
   std::int32_t l = 0;
+  double share = 1;           // less for a tether between what is not connected; mass and covariance are scaled by it
   double mass = 0;            // volume, in units of the mean cell volume
   geometry::Vec3 mean;        // centroid of k ∪ l
   geometry::Mat3 covariance;  // Σ mass (x − mean)(x − mean)ᵀ, the cells' own extent included, so that even a lone cell resists rotation
@@ -40,6 +42,7 @@ struct PatchEdge {
 struct PatchModel {
   std::int32_t patch_count = 0;
   std::vector<geometry::Vec3> centre;         // [patches] centroid of each patch
+  std::vector<geometry::Mat3> covariance;     // [patches] Σ mass (x − centre)(x − centre)ᵀ, the cells' own extent included
   std::vector<PatchEdge> edges;               // sorted by (k, l); then weak ones that tie what is not connected
   double edge_mass = 0;                       // Σ mass over the edges
   std::vector<SurfaceSample> surface;         // 12 mm apart

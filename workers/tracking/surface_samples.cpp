@@ -66,7 +66,8 @@ std::vector<std::size_t> SpreadFacets(const std::vector<Facet>& facets, std::siz
 }
 
 /// The facets nearest to each chosen one decide its normal, and the one nearest to their mean its position.
-void AddSamples(const std::vector<Facet>& facets, const std::vector<std::size_t>& chosen, std::int32_t patch, std::vector<SurfaceSample>& samples) {
+void AddSamples(const std::vector<Facet>& facets, const std::vector<std::size_t>& chosen, const SurfaceSample& home,
+                std::vector<SurfaceSample>& samples) {
   std::vector<std::size_t> owner(facets.size());
   std::vector<Vec3> mean(chosen.size(), Vec3::Zero());
   std::vector<Vec3> normal(chosen.size(), Vec3::Zero());
@@ -88,7 +89,7 @@ void AddSamples(const std::vector<Facet>& facets, const std::vector<std::size_t>
     for (std::size_t i = 0; i < facets.size(); ++i) {
       if (owner[i] == c && (facets[i].centre - mean[c]).squaredNorm() < (facets[nearest].centre - mean[c]).squaredNorm()) nearest = i;
     }
-    samples.push_back({facets[nearest].centre, normal[c].normalized(), patch});
+    samples.push_back({facets[nearest].centre, normal[c].normalized(), home.patch, home.cell});
   }
 }
 
@@ -103,7 +104,8 @@ std::vector<SurfaceSample> SampleTemplateSurface(const geometry::Cells& cells, c
     double area = 0;
     for (const Facet& facet : facets) area += facet.area.norm();
     const auto count = static_cast<std::size_t>(std::max(1.0, std::round(area / area_a_sample)));
-    AddSamples(facets, SpreadFacets(facets, std::min(count, facets.size())), patch[cell], samples);
+    AddSamples(facets, SpreadFacets(facets, std::min(count, facets.size())),
+               {.position = {}, .normal = {}, .patch = patch[cell], .cell = static_cast<std::int32_t>(cell)}, samples);
   }
   return samples;
 }

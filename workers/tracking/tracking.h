@@ -57,9 +57,9 @@ absl::StatusOr<geometry::PoseTrack> CarryAlongStretches(const geometry::Template
                                                         const std::vector<geometry::Stretch>& stretches, const std::vector<std::int32_t>& frames);
 
 struct TrackOptions {
-  std::int32_t iterations = 16;
+  std::int32_t iterations = 6;
   double regulariser = 0.3;
-  double sigma_start_m = 0.020;
+  double sigma_start_m = 0.010;
   double sigma_end_m = 0.005;
   double normal_angle_max_deg = 45;  // θmax
   double depth_tolerance_m = 0.015;  // ε
@@ -67,8 +67,9 @@ struct TrackOptions {
   absl::Status Validate() const;
 };
 
-/// One window (paper, section 4.5): poses of all its frames and their mean pose, from the guide's start. `start` holds every
-/// frame of `window`; its other frames have no influence. Frames that are missing or have no points are interpolated and marked.
+/// One window (paper, section 4.5), from the guide's start: in each frame the template deforms in nodes of about five cells, smoothly as seen from
+/// the start, and the result has a pose for every cell beside those of the patches. `start` holds every frame of `window`; its other frames have no
+/// influence. Frames that are missing or have no points are interpolated and marked.
 absl::StatusOr<geometry::PoseTrack> TrackWindow(const geometry::Template& model, const std::vector<Observation>& window,
                                                 const geometry::PoseTrack& start, const TrackOptions& options, const base::Progress& progress);
 
@@ -78,7 +79,7 @@ struct AssembleOptions {
   std::int32_t interpolated_max = 10;
 };
 
-/// Joins windows (overlaps blended), interpolates missing frames (marked), and blends patch transforms at the cells.
+/// Joins windows (overlaps blended) and interpolates missing frames (marked). Cells of a track that has patches alone blend those near them.
 absl::StatusOr<geometry::TrackedTake> Assemble(const geometry::Template& model, const std::vector<geometry::PoseTrack>& windows,
                                                const AssembleOptions& options);
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "workers/tracking/frame_fit.h"
+#include "workers/tracking/fine_model.h"
 #include "workers/tracking/pose_interpolation.h"
 #include "workers/tracking/tracking.h"
 
@@ -15,25 +15,20 @@ namespace {
 using geometry::FrameState;
 using geometry::PoseTrack;
 
-// Points a frame in all iterations but the last few: association is nearly all of the cost, and a frame has far more points than unknowns.
-constexpr std::size_t kPointsEarly = 3000;
-constexpr std::size_t kPointsLate = 12000;
+// Points a frame and iteration: association is most of the cost. They are drawn by turns, so that over the iterations every point is used.
+constexpr std::size_t kPoints = 25000;
 constexpr std::size_t kPointsMeasured = 5000;
-constexpr int kLateIterations = 2;
-constexpr int kFirstMeanSteps = 4;
 
-/// The stage of one iteration: σ falls geometrically; points are drawn by turns, so that over the iterations every point is used.
-FitStage StageOf(const TrackOptions& options, std::int32_t iteration, std::size_t points) {
-  const bool late = iteration + kLateIterations >= options.iterations;
+/// The stage of one iteration: σ falls geometrically.
+ElasticStage StageOf(const TrackOptions& options, std::int32_t iteration, std::size_t points) {
   const double progress = options.iterations > 1 ? static_cast<double>(iteration) / (options.iterations - 1) : 1.0;
-  FitStage stage;
+  ElasticStage stage;
   stage.sigma_m = options.sigma_start_m * std::pow(options.sigma_end_m / options.sigma_start_m, progress);
-  stage.coarse = stage.sigma_m > 0.010;
-  stage.reach_m = stage.coarse ? std::max(2 * stage.sigma_m, 0.030) : 0.016;
+  stage.reach_m = std::max(stage.reach_m, 2 * stage.sigma_m);
   stage.cosine_min = std::cos(options.normal_angle_max_deg * std::numbers::pi / 180);
   stage.depth_tolerance_m = options.depth_tolerance_m;
   stage.regulariser = options.regulariser;
-  stage.stride = std::max<std::size_t>(1, points / (late ? kPointsLate : kPointsEarly));
+  stage.stride = std::max<std::size_t>(1, points / kPoints);
   stage.phase = static_cast<std::size_t>(iteration) % stage.stride;
   return stage;
 }
@@ -69,26 +64,23 @@ absl::Status ValidateWindow(const std::vector<Observation>& window) {
   return absl::OkStatus();
 }
 
-/// The window's frames that can be fitted, and their poses.
-struct Fitted {
-  std::vector<std::size_t> frame;  // index into the window
-  std::vector<ObservedFrame> observed;
-  std::vector<Pose> pose;
-};
+/// Fits one frame from its start, into row f of the track.
+void FitFrame(const FineModel& model, ElasticFit& fit, const TrackOptions& options, const ObservedFrame& observed, std::size_t f, PoseTrack& track) {
+  const std::size_t points = observed.position.size();
+  std::vector<ElasticStage> stages;
+  for (std::int32_t i = 0; i < options.iterations; ++i) stages.push_back(StageOf(options, i, points));
+  Deformation deformation = model.FromPatches(&track.Pose(f, 0));
+  fit.Run(observed, stages, deformation);
 
-/// Frames and their mean pose by turns (paper, section 4.5): each frame takes a step towards its data with the mean pose fixed, then the mean
-/// follows.
-void FitFrames(FrameFit& fit, const PatchModel& model, const TrackOptions& options, Fitted& fitted, const base::Progress& progress) {
-  Pose mean = fitted.pose[fitted.pose.size() / 2];
-  UpdateMeanPose(model, fitted.pose, kFirstMeanSteps, fit.equations(), mean);
-  for (std::int32_t iteration = 0; iteration < options.iterations; ++iteration) {
-    const std::vector<Relation> reference = RelationsOf(model, mean);
-    for (std::size_t f = 0; f < fitted.pose.size(); ++f) {
-      fit.Step(fitted.observed[f], StageOf(options, iteration, fitted.observed[f].position.size()), reference, fitted.pose[f]);
-    }
-    UpdateMeanPose(model, fitted.pose, 1, fit.equations(), mean);
-    base::Report(progress, (iteration + 1.0) / (options.iterations + 1.0));
-  }
+  ElasticStage measured = stages.back();
+  measured.stride = std::max<std::size_t>(1, points / kPointsMeasured);
+  measured.phase = 0;
+  const FitQuality quality = fit.Measure(observed, measured, deformation);
+  track.residual[f] = quality.residual_m;
+  track.confidence[f] = quality.confidence;
+  const std::vector<geometry::Rigid3> cells = model.CellPoses(deformation);
+  std::ranges::copy(cells, track.cell_pose.begin() + static_cast<std::ptrdiff_t>(f * cells.size()));
+  std::ranges::copy(model.PatchPoses(cells), &track.Pose(f, 0));
 }
 
 }  // namespace
@@ -103,37 +95,27 @@ absl::StatusOr<PoseTrack> TrackWindow(const geometry::Template& model, const std
 
   PoseTrack track;
   track.patch_count = model.patch_count;
-  Fitted fitted;
+  for (const Observation& observation : window) track.frames.push_back(observation.frame);
+  for (const Pose& pose : *start_poses) track.world_from_template.insert(track.world_from_template.end(), pose.begin(), pose.end());
+  track.state.assign(window.size(), FrameState::kInterpolated);
+  track.residual.assign(window.size(), 0);
+  track.confidence.assign(window.size(), 0);
+  track.cell_pose.resize(window.size() * model.cells.size());
+  const FineModel fine(model);
+  ElasticFit fit(fine.nodes());
   for (std::size_t f = 0; f < window.size(); ++f) {
     auto observed = PrepareObservation(window[f]);
     if (!observed.ok()) return base::Annotate(observed.status(), "track window");
-    track.frames.push_back(window[f].frame);
-    track.state.push_back(observed->empty() ? FrameState::kInterpolated : FrameState::kTracked);
-    if (observed->empty()) continue;
-    fitted.frame.push_back(f);
-    fitted.observed.push_back(*std::move(observed));
-    fitted.pose.push_back((*start_poses)[f]);
-  }
-  track.residual.assign(window.size(), 0);
-  track.confidence.assign(window.size(), 0);
-
-  if (!fitted.frame.empty()) {
-    const PatchModel patches = BuildPatchModel(model.cells, model.patch, model.patch_count);
-    FrameFit fit(patches);
-    FitFrames(fit, patches, options, fitted, progress);
-    for (std::size_t i = 0; i < fitted.frame.size(); ++i) {
-      FitStage stage = StageOf(options, options.iterations - 1, fitted.observed[i].position.size());
-      stage.stride = std::max<std::size_t>(1, fitted.observed[i].position.size() / kPointsMeasured);
-      stage.phase = 0;
-      const FitQuality quality = fit.Measure(fitted.observed[i], stage, fitted.pose[i]);
-      track.residual[fitted.frame[i]] = quality.residual_m;
-      track.confidence[fitted.frame[i]] = quality.confidence;
-      (*start_poses)[fitted.frame[i]] = std::move(fitted.pose[i]);
+    if (!observed->empty()) {
+      FitFrame(fine, fit, options, *observed, f, track);
+      track.state[f] = FrameState::kTracked;
     }
+    base::Report(progress, (static_cast<double>(f) + 1) / (static_cast<double>(window.size()) + 1));
   }
-  for (const Pose& pose : *start_poses) track.world_from_template.insert(track.world_from_template.end(), pose.begin(), pose.end());
   // A window without any observed frame keeps the guide's poses; Assemble knows what lies on both sides of it.
-  if (!fitted.frame.empty()) RETURN_IF_ERROR(FillUntracked(PatchCentres(model.cells, model.patch, model.patch_count), track));
+  const bool any = std::ranges::count(track.state, FrameState::kTracked) > 0;
+  if (any) RETURN_IF_ERROR(FillUntracked(PatchCentres(model.cells, model.patch, model.patch_count), model.cells.centroid, track));
+  if (!any) track.cell_pose.clear();
   base::Report(progress, 1);
   return track;
 }
