@@ -61,6 +61,7 @@ absl::Status Export(const ExportFlags& flags) {
   PercentView view("Export");
   RETURN_IF_ERROR(format.write(take, out, [&](double fraction) { view.Show(fraction); }));
   view.Finish();
+  if (take.has_more) fmt::print("Copies and cells that turn into another take's are not exported: this has the take's own cells only.\n");
   fmt::print("Wrote {}: {} cells and {} scene objects at {} instants, {:.2f} s\n", out.string(), take.cell_count(), take.objects.size(),
              take.instant_count(), take.time.back() - take.time.front());
   return absl::OkStatus();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "services/interchange/gltf.h"
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstring>
@@ -114,12 +115,13 @@ class GltfScene {
       AddChannel(node_index, "rotation", "LINEAR", Accessor(kRotations, std::as_bytes(std::span(rotations)), poses.size(), TINYGLTF_TYPE_VEC4));
   }
 
-  /// Shows and hides: a node of scale 0 is not drawn.
-  void AnimateVisibility(int node_index, const std::vector<bool>& visible) {
+  /// Sizes, one an instant. A node of size 0 is not drawn; what only comes and goes does so at once.
+  void AnimateSize(int node_index, const std::vector<float>& sizes) {
     std::vector<Vec3f> scales;
-    for (const bool shown : visible) scales.push_back(shown ? Vec3f::Ones() : Vec3f::Zero());
-    node(node_index).scale.assign(3, visible.front() ? 1 : 0);
-    AddChannel(node_index, "scale", "STEP", Accessor(kScales, std::as_bytes(std::span(scales)), visible.size(), TINYGLTF_TYPE_VEC3));
+    for (const float size : sizes) scales.push_back(Vec3f::Constant(size));
+    const bool grows = std::ranges::any_of(sizes, [](float size) { return size != 0 && size != 1; });
+    node(node_index).scale.assign(3, sizes.front());
+    AddChannel(node_index, "scale", grows ? "LINEAR" : "STEP", Accessor(kScales, std::as_bytes(std::span(scales)), sizes.size(), TINYGLTF_TYPE_VEC3));
   }
 
   absl::Status Write(const std::filesystem::path& path) {
@@ -233,15 +235,13 @@ void AddCell(const MovingCells& take, std::size_t cell, GltfScene& scene) {
   scene.node(node).extras = tinygltf::Value(extras);
 
   std::vector<Rigid3> poses;
-  std::vector<bool> visible;
-  bool vanishes = false;
+  std::vector<float> sizes;
   for (std::size_t s = 0; s < take.instant_count(); ++s) {
     poses.push_back(WorldFromShape(take, s, cell));
-    visible.push_back(take.State(s, cell) != CellState::kGone);
-    vanishes |= !visible.back();
+    sizes.push_back(take.Size(s, cell));
   }
   scene.Animate(node, poses);
-  if (vanishes) scene.AnimateVisibility(node, visible);
+  if (std::ranges::any_of(sizes, [](float size) { return size != 1; })) scene.AnimateSize(node, sizes);
 }
 
 void AddObject(const MovingCells& take, std::size_t object, GltfScene& scene) {

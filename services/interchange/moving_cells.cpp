@@ -51,6 +51,11 @@ Rigid3 MovingCells::Pose(std::size_t instant, std::size_t cell) const {
   return {geometry::Quat(q[0], q[1], q[2], q[3]).normalized(), translation[instant * cell_count() + cell]};
 }
 
+float MovingCells::Size(std::size_t instant, std::size_t cell) const {
+  if (State(instant, cell) == geometry::CellState::kGone) return 0;
+  return scale.empty() ? 1 : scale[instant * cell_count() + cell];
+}
+
 absl::StatusOr<MovingCells> ReadMovingCells(const fs::path& take, const fs::path& tracked) {
   ASSIGN_OR_RETURN(const fs::path path, TakeFile(take));
   ASSIGN_OR_RETURN(const bool is_simulated, storage::HoldsSimulatedTake(path));
@@ -73,6 +78,8 @@ absl::StatusOr<MovingCells> ReadMovingCells(const fs::path& take, const fs::path
   moving.rotation = std::move(simulated.cell_rotation);
   moving.translation = std::move(simulated.cell_translation);
   moving.state = std::move(simulated.cell_state);
+  moving.scale = std::move(simulated.cell_scale);
+  moving.has_more = !simulated.copies.offset.empty() || !simulated.morph.vertex_offset.empty();
   moving.objects = std::move(simulated.objects);
   moving.object_pose = std::move(simulated.object_pose);
   return moving;
@@ -90,6 +97,7 @@ void KeepEvery(std::size_t n, MovingCells& take) {
   keep(take.rotation, take.cell_count());
   keep(take.translation, take.cell_count());
   keep(take.state, take.cell_count());
+  if (!take.scale.empty()) keep(take.scale, take.cell_count());
   keep(take.object_pose, take.objects.size());
   keep(take.time, 1);  // last: the others count by it
 }

@@ -18,6 +18,8 @@ struct MovingCells {
   std::vector<Eigen::Vector4f> rotation;       // [S*n] w x y z
   std::vector<geometry::Vec3> translation;     // [S*n] world_from_template
   std::vector<geometry::CellState> state;      // [S*n]; all recalled where nothing was simulated
+  std::vector<float> scale;                    // [S*n] 0 … 1, or empty: cells keep their size
+  bool has_more = false;                       // the take has copies or morphing cells, which are not in here
   std::vector<geometry::SceneObject> objects;  // [m]
   std::vector<geometry::Rigid3> object_pose;   // [S*m] world_from_object
 
@@ -25,6 +27,8 @@ struct MovingCells {
   std::size_t cell_count() const { return model.cells.size(); }
   geometry::Rigid3 Pose(std::size_t instant, std::size_t cell) const;
   geometry::CellState State(std::size_t instant, std::size_t cell) const { return state[instant * cell_count() + cell]; }
+  /// About its centroid; 0 for a cell that is gone.
+  float Size(std::size_t instant, std::size_t cell) const;
 };
 
 /// Reads `take`: a tracked.h5, a simulated.h5, or a folder that holds them, of which the simulated one is taken where there is one. The

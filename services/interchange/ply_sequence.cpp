@@ -41,6 +41,7 @@ std::string Frame(const MovingCells& take, const std::vector<CellShape>& shapes,
     if (state == CellState::kGone) continue;
     const CellShape& shape = shapes[cell];
     const Rigid3 world_from_shape = WorldFromShape(take, instant, cell);
+    const double size = take.Size(instant, cell);
     number.assign(shape.vertices.size(), -1);
     for (const CellShape::Face& face : shape.faces) {
       if (!IsVisible(take, instant, cell, face)) continue;
@@ -50,7 +51,7 @@ std::string Frame(const MovingCells& take, const std::vector<CellShape>& shapes,
         std::int32_t& at = number[static_cast<std::size_t>(v)];
         if (at < 0) {
           at = vertex_count++;
-          Append(Vec3f((world_from_shape * shape.vertices[static_cast<std::size_t>(v)]).cast<float>()), vertices);
+          Append(Vec3f((world_from_shape * (size * shape.vertices[static_cast<std::size_t>(v)])).cast<float>()), vertices);
         }
         Append(at, faces);
       }

@@ -43,10 +43,6 @@ std::string MddHead(const MovingCells& take, std::uint32_t vertices) {
   return head;
 }
 
-Vec3 Placed(const MovingCells& take, std::size_t instant, std::size_t cell, const Rigid3& world_from_shape, const Vec3& vertex) {
-  return take.State(instant, cell) == geometry::CellState::kGone ? world_from_shape.translation : world_from_shape * vertex;
-}
-
 absl::Status WriteObj(const MovingCells& take, const std::vector<CellShape>& shapes, const std::filesystem::path& path) {
   std::ofstream file(path, std::ios::trunc);
   file << "# Vorocast: the cells at the first instant, metres, y up\n";
@@ -100,8 +96,9 @@ absl::Status WritePointCache(const MovingCells& take, PointCache format, const s
     std::string bytes;
     for (std::size_t cell = 0; cell < shapes.size(); ++cell) {
       const Rigid3 world_from_shape = WorldFromShape(take, s, cell);
+      const double size = take.Size(s, cell);
       for (const Vec3& vertex : shapes[cell].vertices) {
-        const Vec3 x = Placed(take, s, cell, world_from_shape, vertex);
+        const Vec3 x = world_from_shape * (size * vertex);
         for (const double coordinate : {x.x(), x.y(), x.z()}) Append(static_cast<float>(coordinate), order, bytes);
       }
     }

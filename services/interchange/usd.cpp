@@ -154,6 +154,11 @@ absl::Status WriteUsd(const MovingCells& take, const std::filesystem::path& path
       fmt::format_to(out, "({:.5g}, {:.5g}, {:.5g}, {:.5g})", q.w(), q.x(), q.y(), q.z());
     });
   });
+  if (!take.scale.empty()) {
+    WriteSamples(take, "float3[] scales", file, [&](std::size_t s) {
+      return List(n, [&](std::size_t c, auto& out) { fmt::format_to(out, "({0:.4g}, {0:.4g}, {0:.4g})", take.Size(s, c)); });
+    });
+  }
   WriteSamples(take, "int64[] invisibleIds", file, [&](std::size_t s) {
     std::vector<std::size_t> gone;
     for (std::size_t c = 0; c < n; ++c) {

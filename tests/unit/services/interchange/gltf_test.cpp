@@ -89,6 +89,23 @@ TEST_F(Gltf, GoneCellsAreScaledToNothing) {
   EXPECT_EQ(ToVec3(channel->mScalingKeys[2].mValue), Vec3(0, 0, 0));
 }
 
+TEST(GltfFile, CellsShrinkLittleByLittle) {
+  const TemporaryFolder folder;
+  MovingCells take = ThreeCubesMoving();
+  take.scale = {1, 1, 1, 1, 0.5F, 1, 1, 0.25F, 1};
+  ASSERT_EQ(WriteGltf(take, folder / "take.glb", {}), absl::OkStatus());
+  Assimp::Importer importer;
+  const aiScene* scene = importer.ReadFile((folder / "take.glb").string(), 0);
+  ASSERT_NE(scene, nullptr);
+  for (unsigned i = 0; i < scene->mAnimations[0]->mNumChannels; ++i) {
+    const aiNodeAnim* channel = scene->mAnimations[0]->mChannels[i];
+    if (std::string(channel->mNodeName.C_Str()) != "cell_00001") continue;
+    ASSERT_EQ(channel->mNumScalingKeys, 3u);
+    EXPECT_EQ(ToVec3(channel->mScalingKeys[1].mValue), Vec3(0.5, 0.5, 0.5));
+    EXPECT_EQ(ToVec3(channel->mScalingKeys[2].mValue), Vec3(0.25, 0.25, 0.25));
+  }
+}
+
 TEST_F(Gltf, SceneObjectsMoveToo) {
   const aiNode* ball = scene_->mRootNode->FindNode("ball");
   ASSERT_NE(ball, nullptr);
