@@ -28,11 +28,11 @@ Graph RandomGraph(int n, int more_edges, unsigned seed) {
   std::uniform_real_distribution<double> share(0.2, 1.8);
   Graph graph;
   for (int c = 0; c < n; ++c) graph.volume.push_back(share(random) * 1e-4);
-  for (int c = 1; c < n; ++c) graph.edges.push_back({.a = static_cast<std::int32_t>(random() % c), .b = c});
+  for (int c = 1; c < n; ++c) graph.edges.push_back({.a = static_cast<std::int32_t>(random() % c), .b = c, .face_centre = Vec3::Zero()});
   for (int e = 0; e < more_edges; ++e) {
     const auto a = static_cast<std::int32_t>(random() % n);
     const auto b = static_cast<std::int32_t>(random() % n);
-    if (a != b) graph.edges.push_back({.a = std::min(a, b), .b = std::max(a, b)});
+    if (a != b) graph.edges.push_back({.a = std::min(a, b), .b = std::max(a, b), .face_centre = Vec3::Zero()});
   }
   for (CellEdge& edge : graph.edges) {
     edge.area = share(random) * 1e-3;
@@ -86,7 +86,7 @@ TEST(Heat, IsTheMatrixExponential) {
 
 /// Two cells: the difference decays as e^−2τ.
 TEST(Heat, TwoCellsShare) {
-  const HeatGraph heat({{.a = 0, .b = 1, .area = 1, .distance = 1}}, {1, 1}, Weights::kGraph);
+  const HeatGraph heat({{.a = 0, .b = 1, .area = 1, .distance = 1, .face_centre = Vec3::Zero()}}, {1, 1}, Weights::kGraph);
   const std::vector<double> result = heat.Diffuse({1, 0}, 0.7);
   EXPECT_NEAR(result[0], 0.5 + 0.5 * std::exp(-1.4), 1e-14);
   EXPECT_NEAR(result[1], 0.5 - 0.5 * std::exp(-1.4), 1e-14);
@@ -131,7 +131,7 @@ TEST(Heat, NeverLeaksBetweenComponents) {
 TEST(Heat, HeldSourcesStayHot) {
   constexpr int kN = 12;
   std::vector<CellEdge> edges;
-  for (std::int32_t c = 1; c < kN; ++c) edges.push_back({.a = c - 1, .b = c, .area = 1, .distance = 1});
+  for (std::int32_t c = 1; c < kN; ++c) edges.push_back({.a = c - 1, .b = c, .area = 1, .distance = 1, .face_centre = Vec3::Zero()});
   const HeatGraph heat(edges, std::vector<double>(kN, 1), Weights::kGraph);
   std::vector<double> start(kN, 0);
   std::vector<bool> held(kN, false);

@@ -87,9 +87,11 @@ TEST(CheckTake, RefusesWhatDoesNotFit) {
 TEST(ReleaseSchedule, GoesByHeight) {
   const auto take = Animate(CubeBlock(1, 5, 1, 0.1), 3, 25, testing::Still);
   const TrackedMotion motion(take);
-  const auto from_top = ScheduleRelease(motion, {{.from_top = true, .start_s = 1, .end_s = 3}});
-  const auto from_bottom = ScheduleRelease(motion, {{.from_top = false, .start_s = 0, .end_s = 4}});
-  const auto upper_half = ScheduleRelease(motion, {{.from_top = true, .start_s = 1, .end_s = 2, .share = 0.5}});
+  const MaskSubject subject(take.model, motion, Vec3::Zero());
+  const auto times = [&](const ReleaseByHeight& rule) { return ScheduleRelease(motion, subject, {ReleaseRule{.by = rule}}, 10).release; };
+  const auto from_top = times({.from_top = true, .start_s = 1, .end_s = 3});
+  const auto from_bottom = times({.from_top = false, .start_s = 0, .end_s = 4});
+  const auto upper_half = times({.from_top = true, .start_s = 1, .end_s = 2, .share = 0.5});
   for (std::size_t c = 0; c < 5; ++c) {
     EXPECT_NEAR(from_top[c], 3 - 0.5 * static_cast<double>(c), 1e-9);
     EXPECT_NEAR(from_bottom[c], static_cast<double>(c), 1e-9);
@@ -98,7 +100,7 @@ TEST(ReleaseSchedule, GoesByHeight) {
   EXPECT_TRUE(std::isinf(upper_half[1]));
   EXPECT_NEAR(upper_half[2], 2, 1e-9);
   EXPECT_NEAR(upper_half[4], 1, 1e-9);
-  EXPECT_TRUE(std::isinf(ScheduleRelease(motion, {})[0]));
+  EXPECT_TRUE(std::isinf(ScheduleRelease(motion, subject, {}, 10).release[0]));
 }
 
 TEST(Scene, LowestPointIsOverAllFramesAndCorners) {
