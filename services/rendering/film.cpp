@@ -128,6 +128,8 @@ class FilmCamera {
   }
 
   void Expose(std::int32_t column, std::int32_t row, FilmPicture& picture) const {
+    const Ray middle = camera_.Through(static_cast<float>(column) + 0.5F, static_cast<float>(row) + 0.5F, kFar);
+    if (lights_.even.SeesNothing(middle, camera_.pixel)) return;
     const Jitter jitter(column, row);
     PixelSum sum;
     const std::size_t at = At(column, row);
@@ -138,7 +140,6 @@ class FilmCamera {
     if (!sum.HasHit()) return;
     picture.coverage[at] = sum.Coverage();
     const Hit& hit = sum.nearest();
-    const Ray middle = camera_.Through(static_cast<float>(column) + 0.5F, static_cast<float>(row) + 0.5F, kFar);
     const Vec3f point = middle.origin + sum.depth() / middle.direction.dot(camera_.forward) * middle.direction;
     picture.depth[at] = sum.depth();
     picture.normal[at] = hit.normal.dot(middle.direction) > 0 ? Vec3f(-hit.normal) : hit.normal;

@@ -99,28 +99,47 @@ Vec3f StudioLight::Surface(const Ray& ray, const Hit& hit, int sample, const Jit
   return Expose(0.7F * colour.cwiseProduct(light) + (0.22F + 0.6F * grazing) * SkyLight(mirrored) + 0.8F * gloss * key);
 }
 
-/// Most of the ground sees all of the light; knowing it from the scene's box saves sending rays.
-bool StudioLight::IsFarFromAll(const Vec3f& from) const {
+/// The scene's box, grown by a margin on every side.
+bool StudioLight::MeetsBox(const Vec3f& from, const Vec3f& direction, float margin) const {
+  const Vec3f inverse = direction.cwiseInverse();
+  const Vec3f grown = Vec3f::Constant(margin);
+  const Vec3f a = (scene_.low() - grown - from).cwiseProduct(inverse);
+  const Vec3f b = (scene_.high() + grown - from).cwiseProduct(inverse);
+  return std::max(a.cwiseMin(b).maxCoeff(), 0.0F) <= a.cwiseMax(b).minCoeff();
+}
+
+/// Most of the ground sees all of the light; knowing it from the scene's box saves sending rays. `margin`: of everything within so many metres.
+bool StudioLight::IsFarFromAll(const Vec3f& from, float margin) const {
   const Vec3f& low = scene_.low();
   const Vec3f& high = scene_.high();
   if ((low.array() > high.array()).any()) return true;
   const Vec3f nearest = from.cwiseMax(low).cwiseMin(high);
-  const float reach = kSkyReach * studio_.extent;
+  const float reach = kSkyReach * studio_.extent + margin;
   if ((nearest - from).squaredNorm() < reach * reach) return false;
   // The key light's cone widens by less than its radius times the way to the far end of the box; a box grown by that holds all it could meet.
-  const float way = ((low + high) / 2 - from).norm() + (high - low).norm() / 2;
-  const Vec3f grown = Vec3f::Constant(1.01F * kKeyRadius * way);
-  const Vec3f inverse = key_.cwiseInverse();
-  const Vec3f a = (low - grown - from).cwiseProduct(inverse);
-  const Vec3f b = (high + grown - from).cwiseProduct(inverse);
-  return std::max(a.cwiseMin(b).maxCoeff(), 0.0F) > a.cwiseMax(b).minCoeff();
+  const float way = ((low + high) / 2 - from).norm() + (high - low).norm() / 2 + margin;
+  return !MeetsBox(from, key_, 1.01F * kKeyRadius * way + margin);
+}
+
+bool StudioLight::SeesNothing(const Ray& ray, float spread) const {
+  const Vec3f& low = scene_.low();
+  const Vec3f& high = scene_.high();
+  if ((low.array() <= high.array()).all()) {
+    const float way = ((low + high) / 2 - ray.origin).norm() + (high - low).norm() / 2;
+    if (MeetsBox(ray.origin, ray.direction, spread * way)) return false;
+  }
+  if (ray.direction.y() >= spread) return true;
+  if (ray.direction.y() > -2 * spread) return false;  // along the horizon a little aside is far away on the ground
+  const float to_ground = (studio_.ground - ray.origin.y()) / ray.direction.y();
+  if (to_ground < 0) return true;  // from below
+  return IsFarFromAll(ray.origin + to_ground * ray.direction, 4 * spread * to_ground / -ray.direction.y());
 }
 
 /// Nothing shows where nothing is in the way: there it is exactly one.
 Vec3f StudioLight::Unshadowed(const Ray& ray, const Vec3f& point, int sample, const Jitter& jitter) const {
   const Vec3f up = Vec3f::UnitY();
   const Vec3f from = point + 1e-4F * up;
-  if (IsFarFromAll(from)) return Vec3f::Ones();
+  if (IsFarFromAll(from, 0)) return Vec3f::Ones();
   const Vec3f open = key_.y() * KeyColour() + OpenSky();
   const Vec3f light = Key(ray, from, up, rays_.key_ground, sample, jitter) * key_.y() * KeyColour() + Sky(ray, from, up, sample, jitter);
   if (light == open) return Vec3f::Ones();

@@ -42,12 +42,15 @@ class StudioLight {
   /// The scene and the studio must outlive it. The key light stands relative to the camera.
   StudioLight(const Scene& scene, const Camera& camera, const Studio& studio, const LightRays& rays);
 
+  /// True only where no ray within `spread` (at distance 1) of this one meets anything, not even a shadow on the ground.
+  bool SeesNothing(const Ray& ray, float spread) const;
   /// `sample`: 0 … samples−1, which of the pixel's rays it is.
   Seen Look(const Ray& ray, int sample, const Jitter& jitter) const;
 
  private:
   geometry::Vec3f Surface(const Ray& ray, const Hit& hit, int sample, const Jitter& jitter) const;
-  bool IsFarFromAll(const geometry::Vec3f& from) const;
+  bool IsFarFromAll(const geometry::Vec3f& from, float margin) const;
+  bool MeetsBox(const geometry::Vec3f& from, const geometry::Vec3f& direction, float margin) const;
   geometry::Vec3f Unshadowed(const Ray& ray, const geometry::Vec3f& point, int sample, const Jitter& jitter) const;
   float Key(const Ray& ray, const geometry::Vec3f& from, const geometry::Vec3f& normal, int rays, int sample, const Jitter& jitter) const;
   geometry::Vec3f Sky(const Ray& ray, const geometry::Vec3f& from, const geometry::Vec3f& normal, int sample, const Jitter& jitter) const;
