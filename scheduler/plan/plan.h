@@ -27,7 +27,7 @@ struct JobSpec {
   std::int32_t template_frame = -1;  // −1: chosen by the template task from the tessellated frames
   std::int32_t patches = 200;
   std::int32_t window_frames = 10;
-  std::int32_t overlap_frames = 3;    // frames that a window shares with the next
+  std::int32_t overlap_frames = 1;    // frames that a window shares with the next
   std::int32_t stretch_frames = 48;   // about; a take is followed coarsely in stretches of so many frames, side by side
   std::int32_t interpolated_max = 0;  // bad frames that are made up for; negative: a tenth of the take's frames
   double frames_per_second = 25;

@@ -90,25 +90,4 @@ void AddPoseDistance(const PatchModel& model, const Pose& pose, const std::vecto
   }
 }
 
-void UpdateMeanPose(const PatchModel& model, const std::vector<Pose>& poses, int steps, NormalEquations& equations, Pose& mean) {
-  // Σ_t |T_kl^t x − M_kl x|² differs from (number) · |mean_t(T_kl^t) x − M_kl x|² by a constant, and the identity is one more pose.
-  const double share = 1.0 / (static_cast<double>(poses.size()) + 1);
-  std::vector<Relation> average(model.edges.size(), Relation{share * Mat3::Identity(), Vec3::Zero()});
-  for (const Pose& pose : poses) {
-    const std::vector<Relation> relations = RelationsOf(model, pose);
-    for (std::size_t e = 0; e < average.size(); ++e) {
-      average[e].matrix += share * relations[e].matrix;
-      average[e].offset += share * relations[e].offset;
-    }
-  }
-  std::vector<Vector6> twists;
-  for (int step = 0; step < steps; ++step) {
-    equations.Clear();
-    AddPoseDistance(model, mean, average, 1, equations);
-    // The mean pose as a whole may lie anywhere: a little damping keeps it where it is.
-    equations.Solve(1e-6, twists);
-    ApplyTwists(model, twists, mean);
-  }
-}
-
 }  // namespace vorocast::tracking

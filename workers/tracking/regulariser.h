@@ -24,7 +24,4 @@ double PoseDistance(const PatchModel& model, const Pose& pose, const std::vector
 /// Adds weight · D and its derivatives to the equations.
 void AddPoseDistance(const PatchModel& model, const Pose& pose, const std::vector<Relation>& reference, double weight, NormalEquations& equations);
 
-/// The mean pose M = argmin Σ_t D(T^t, M) + D(M, Id) (paper, equations for the mean and rest pose), by `steps` Gauss–Newton steps from `mean`.
-void UpdateMeanPose(const PatchModel& model, const std::vector<Pose>& poses, int steps, NormalEquations& equations, Pose& mean);
-
 }  // namespace vorocast::tracking

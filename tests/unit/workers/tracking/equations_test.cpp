@@ -183,24 +183,6 @@ TEST(BlockCholesky, RefusesWhatIsNotPositiveDefinite) {
   EXPECT_FALSE(cholesky.Factorise());
 }
 
-TEST(UpdateMeanPose, FindsThePoseThatAllShare) {
-  // With many equal poses the identity hardly counts, and their mean pose relates patches as they do.
-  const PatchModel model = LimbModel();
-  Pose bent;
-  for (const Vec3& centre : model.centre) {
-    bent.push_back(centre.x() > 0 ? Rigid3{Quat(Eigen::AngleAxisd(0.3, Vec3::UnitZ())), Vec3::Zero()} : Rigid3{});
-  }
-  NormalEquations equations(model);
-  Pose mean(static_cast<std::size_t>(model.patch_count));
-  UpdateMeanPose(model, std::vector<Pose>(999, bent), 30, equations, mean);
-  const auto expected = RelationsOf(model, bent);
-  const auto found = RelationsOf(model, mean);
-  for (std::size_t e = 0; e < expected.size(); ++e) {
-    EXPECT_TRUE(found[e].matrix.isApprox(expected[e].matrix, 5e-3)) << e;
-    EXPECT_LT((found[e].offset - expected[e].offset).norm(), 2e-3) << e;
-  }
-}
-
 TEST(PointGrid, VisitsEveryPointWithinReach) {
   base::Random random(12);
   std::vector<PosedPoint> points;
