@@ -93,6 +93,7 @@ absl::StatusOr<std::unique_ptr<Fleet>> FleetFlags::StartSlurm(const std::filesys
                             .partition = partition_,
                             .extra = extra_,
                             .limits = limits_};
+  options.limits.seconds_left_floor = std::min(options.limits.seconds_left_floor, finish_in_s_);
   options.finish_in = absl::Seconds(finish_in_s_);
   options.poll = absl::Seconds(poll_s_);
   options.drain_time = absl::Seconds(drain_s_);

@@ -8,7 +8,7 @@
 /// How many workers the work that is left deserves. Values in, values out.
 namespace vorocast::fleet {
 
-/// Tasks of one kind that have not ended, of all jobs.
+/// Tasks of one kind and one job that have not ended.
 struct KindDemand {
   std::int32_t ready = 0;
   std::int32_t running = 0;

@@ -4,6 +4,7 @@
 #include <sys/stat.h>
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 
 #include <fmt/format.h>
@@ -22,6 +23,8 @@ constexpr char kScript[] =
     "# Written by vorocast-scheduler. Becomes the worker, so that Slurm's signals reach it and its exit code reaches Slurm.\n"
     "exec \"$@\" --name \"slurm-${SLURM_ARRAY_JOB_ID:-0}_${SLURM_ARRAY_TASK_ID:-0}-${SLURM_RESTART_COUNT:-0}\"\n";
 
+/// From the last task given back to the worker's end.
+constexpr double kEndMarginSeconds = 5;
 /// Members named in one call of scancel.
 constexpr std::size_t kNamedAtOnce = 200;
 
@@ -155,16 +158,12 @@ absl::Status SlurmFleet::Ask(std::int32_t workers) {
   waiting_for_first_ = true;
   next_ask_ = absl::Now() + ask_pause_;
   const SizingLimits& limits = options_.limits;
-  std::vector<std::string> arguments = {"sbatch",
-                                        "--parsable",
-                                        "--requeue",
-                                        fmt::format("--job-name={}", job_name_),
-                                        fmt::format("--array=1-{}", workers),
-                                        "--ntasks=1",
-                                        fmt::format("--cpus-per-task={}", limits.slots),
-                                        fmt::format("--chdir={}", options_.state.string()),
-                                        fmt::format("--output={}", (options_.state / "logs" / "slurm-%A_%a.log").string()),
-                                        "--open-mode=append"};
+  std::vector<std::string> arguments = {
+      "sbatch", "--parsable", "--requeue", fmt::format("--job-name={}", job_name_), fmt::format("--array=1-{}", workers), "--ntasks=1",
+      fmt::format("--cpus-per-task={}", limits.slots), fmt::format("--chdir={}", options_.state.string()),
+      fmt::format("--output={}", (options_.state / "logs" / "slurm-%A_%a.log").string()), "--open-mode=append",
+      // Before a time limit or a preemption. Without "B:" only srun's steps are told, and there are none.
+      fmt::format("--signal=B:TERM@{:.0f}", std::ceil(absl::ToDoubleSeconds(options_.drain_time)) + kEndMarginSeconds)};
   if (!options_.partition.empty()) arguments.push_back(fmt::format("--partition={}", options_.partition));
   arguments.insert(arguments.end(), options_.extra.begin(), options_.extra.end());
   for (const std::string& word :

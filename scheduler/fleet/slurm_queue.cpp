@@ -43,7 +43,7 @@ std::optional<SlurmMember::State> StateIn(const json* value) {
   }
   const auto has = [&](std::string_view word) { return std::find(words.begin(), words.end(), word) != words.end(); };
   if (has("COMPLETING") || has("STAGE_OUT")) return SlurmMember::State::kEnding;
-  if (has("RUNNING") || has("CONFIGURING") || has("SUSPENDED") || has("STOPPED")) return SlurmMember::State::kUp;
+  if (has("RUNNING") || has("CONFIGURING") || has("SUSPENDED") || has("STOPPED") || has("SIGNALING")) return SlurmMember::State::kUp;
   if (has("PENDING") || has("REQUEUED") || has("REQUEUE_HOLD") || has("REQUEUE_FED") || has("RESIZING")) return SlurmMember::State::kQueued;
   return std::nullopt;
 }

@@ -13,20 +13,26 @@ fleet::Demand DemandOf(const core::State& state) {
   for (const tasks::Kind kind : tasks::kAllKinds) {
     // Simulations go to a service of their own.
     if (kind == tasks::Kind::kSimulate) continue;
-    fleet::KindDemand of_kind;
+    const auto index = static_cast<std::size_t>(kind);
     double seconds = 0;
     std::int32_t measured = 0;
     for (const core::Job& job : state.jobs) {
-      const core::KindCounts& counts = job.counts[static_cast<std::size_t>(kind)];
-      seconds += counts.seconds;
-      measured += counts.measured;
-      of_kind.running += CountOf(counts, core::Phase::kRunning);
-      if (job.starts_nothing()) continue;
-      of_kind.ready += CountOf(counts, core::Phase::kReady);
-      of_kind.blocked += CountOf(counts, core::Phase::kBlocked);
+      seconds += job.counts[index].seconds;
+      measured += job.counts[index].measured;
     }
-    if (measured > 0) of_kind.seconds_mean = seconds / measured;
-    demand.kinds.push_back(of_kind);
+    for (const core::Job& job : state.jobs) {
+      const core::KindCounts& counts = job.counts[index];
+      fleet::KindDemand of_job{.running = CountOf(counts, core::Phase::kRunning)};
+      if (!job.starts_nothing()) {
+        of_job.ready = CountOf(counts, core::Phase::kReady);
+        of_job.blocked = CountOf(counts, core::Phase::kBlocked);
+      }
+      if (of_job.ready + of_job.running + of_job.blocked == 0) continue;
+      // Takes differ in size: what other jobs needed is only a guess.
+      if (measured > 0) of_job.seconds_mean = seconds / measured;
+      if (counts.measured > 0) of_job.seconds_mean = counts.seconds / counts.measured;
+      demand.kinds.push_back(of_job);
+    }
   }
   for (const core::Worker& worker : state.workers) {
     if (worker.connection == 0) continue;
