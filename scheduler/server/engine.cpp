@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::size_t kQueueMax = 100'000;
 /// So long a turn takes in commands: many share one commit, and an answer does not wait for an endless queue.
-constexpr auto kTurnTime = std::chrono::milliseconds(15);
+constexpr auto kTurnTime = std::chrono::milliseconds(10);
 constexpr auto kTick = std::chrono::milliseconds(50);
 constexpr auto kCommitPauseFirst = std::chrono::milliseconds(20);
 constexpr auto kCommitPauseLast = std::chrono::milliseconds(500);

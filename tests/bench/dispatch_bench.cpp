@@ -73,13 +73,13 @@ class Farm {
     thread_ = std::thread([this] { Work(); });
   }
   ~Farm() {
-    engine_.Stop();
     {
       const std::lock_guard lock(mutex_);
       stopping_ = true;
     }
     wake_.notify_all();
     thread_.join();
+    engine_.Stop();
   }
 
   /// One take of so many frames nobody has seen before, and a job on it.

@@ -72,7 +72,11 @@ class ClockedFarm {
     mail_.pop();
     now_ = mail.at;
     if (std::holds_alternative<core::Tick>(mail.event)) Post(kTick, core::Tick{});
-    if (const auto* beat = std::get_if<core::Heartbeat>(&mail.event)) Post(times_.heartbeat, core::Heartbeat{.connection = beat->connection});
+    if (auto* beat = std::get_if<core::Heartbeat>(&mail.event)) {
+      Post(times_.heartbeat, core::Heartbeat{.connection = beat->connection});
+      if (const auto held = held_.find(beat->connection); held != held_.end()) beat->progress.push_back({.id = held->second});
+    }
+    if (const auto* finished = std::get_if<core::Finished>(&mail.event)) held_.erase(finished->connection);
     Happen(std::move(mail.event));
   }
 
@@ -100,6 +104,7 @@ class ClockedFarm {
     run_.busy_s += absl::ToDoubleSeconds(held);
     run_.spent_s[index] += absl::ToDoubleSeconds(held);
     const absl::Duration after = held + 2 * times_.message;
+    held_[worker] = lease.id;
     run_.ended_s[index] = std::max(run_.ended_s[index], absl::ToDoubleSeconds(now_ + after - begin_));
     Post(after, core::Finished{.connection = worker, .id = lease.id, .outcome = core::Succeeded{.result = {.sha256 = lease.id.key, .size = 1}}});
   }
@@ -109,6 +114,7 @@ class ClockedFarm {
   const absl::Time begin_ = absl::UnixEpoch();
   absl::Time now_ = begin_;
   std::int64_t posted_ = 0;
+  std::map<core::ConnectionId, core::AttemptId> held_;  // each worker has one slot
   std::priority_queue<Mail, std::vector<Mail>, std::greater<>> mail_;
   FarmRun run_;
 };

@@ -34,5 +34,16 @@ TEST(Scaling, ManyWorkersWaitForTheLongestChainOnly) {
   EXPECT_LT(run->wall_s, 5.5);
 }
 
+TEST(Scaling, ATaskMayTakeLongerThanALeaseLasts) {
+  plan::JobSpec job;
+  job.sheets = false;
+  FarmTimes times = Times();
+  times.of[static_cast<std::size_t>(tasks::Kind::kAssemble)].start_s = 100;
+  const auto run = RunClockedFarm(job, 100, 1000, times);
+  ASSERT_TRUE(run.ok()) << run.status();
+  EXPECT_NEAR(run->busy_s, 218 + 119 * 0.02, 0.01);
+  EXPECT_LT(run->wall_s, 104.5);
+}
+
 }  // namespace
 }  // namespace vorocast::scenario

@@ -57,6 +57,11 @@ void SimulatedFarm::SubmitJobs() {
 
 absl::Status SimulatedFarm::Wrong(const std::string& what) const { return absl::InternalError(fmt::format("after {} steps: {}", steps_, what)); }
 
+absl::Status SimulatedFarm::Check(const core::State& state) const {
+  if (const absl::Status status = core::Check(state, steps_ % kKeysEvery == 0); !status.ok()) return Wrong(std::string(status.message()));
+  return absl::OkStatus();
+}
+
 absl::Status SimulatedFarm::Happen(core::Event event) {
   ++steps_;
   const auto* finished = std::get_if<core::Finished>(&event);
@@ -65,10 +70,7 @@ absl::Status SimulatedFarm::Happen(core::Event event) {
   const bool is_tick = std::holds_alternative<core::Tick>(event);
   core::Effects effects = core::Step(state_, std::move(event), now_);
   const bool idle = is_tick && effects.records.empty() && effects.messages.empty() && effects.changed_jobs.empty();
-  if (!idle) {
-    const bool keys = steps_ % kKeysEvery == 0;
-    if (const absl::Status status = core::Check(state_, keys); !status.ok()) return Wrong(std::string(status.message()));
-  }
+  if (!idle) RETURN_IF_ERROR(Check(state_));
   for (const core::Record& record : effects.records) {
     const auto* made = std::get_if<core::ResultMade>(&record);
     if (made && succeeded && made->key != key) return Wrong("a result for another key than was reported");
@@ -77,16 +79,32 @@ absl::Status SimulatedFarm::Happen(core::Event event) {
 }
 
 absl::Status SimulatedFarm::Apply(core::Effects effects) {
-  const bool dies = !effects.records.empty() && !calm_ && Chance(weather_.scheduler_dies);
+  const bool risky = !effects.records.empty() && !calm_ && !starting_;
+  const bool dies = risky && Chance(weather_.scheduler_dies);
   if (dies && Chance(0.5)) return Restart();  // before the commit: nothing of this step is remembered, nothing was sent
-  for (const core::Record& record : effects.records) {
-    if (const auto* made = std::get_if<core::ResultMade>(&record)) {
-      if (++accepted_[made->key] > 1) return Wrong(fmt::format("the result {} was accepted twice", made->key.Short()));
-    }
-    Remember(record);
-  }
+  RETURN_IF_ERROR(Commit(effects.records));
   if (dies) return Restart();  // after the commit: remembered, but nobody was told
-  for (core::Message& message : effects.messages) {
+  if (risky && Chance(weather_.commit_unknown)) {
+    if (Chance(0.3)) return Replace();  // before it could try again
+    const std::string before = memory_.Text();
+    RETURN_IF_ERROR(memory_.Append(term_, effects.records));
+    if (memory_.Text() != before) return Wrong("writing a batch again was not harmless");
+  }
+  Send(std::move(effects.messages));
+  for (const core::LookUp& look_up : effects.look_ups) answers_.push_back({now_ + Delay(), Answer(look_up)});
+  return absl::OkStatus();
+}
+
+absl::Status SimulatedFarm::Commit(const std::vector<core::Record>& records) {
+  for (const core::Record& record : records) {
+    const auto* made = std::get_if<core::ResultMade>(&record);
+    if (made && ++accepted_[made->key] > 1) return Wrong(fmt::format("the result {} was accepted twice", made->key.Short()));
+  }
+  return memory_.Append(term_, records);
+}
+
+void SimulatedFarm::Send(std::vector<core::Message> messages) {
+  for (core::Message& message : messages) {
     const auto stream = to_worker_.find(message.connection);
     if (stream == to_worker_.end()) continue;
     if (!calm_ && Chance(weather_.message_lost)) {
@@ -96,35 +114,18 @@ absl::Status SimulatedFarm::Apply(core::Effects effects) {
     const absl::Time after = stream->second.empty() ? now_ : stream->second.back().at;
     stream->second.push_back({std::max(after, now_ + Delay()), std::move(message)});
   }
-  for (const core::LookUp& look_up : effects.look_ups) {
-    core::LookUpAnswered answer{.key = look_up.key};
-    if (files_.contains(look_up.key)) {
-      const auto recorded = memory_.results.find(look_up.key);
-      answer.recorded = recorded != memory_.results.end();
-      answer.result = answer.recorded ? recorded->second : core::Result{.sha256 = look_up.key, .size = 1};
-    }
-    answers_.push_back({now_ + Delay(), std::move(answer)});
-  }
-  return absl::OkStatus();
 }
 
-void SimulatedFarm::Remember(const core::Record& record) {
-  const auto job = [this](const std::string& id) {
-    return std::find_if(memory_.jobs.begin(), memory_.jobs.end(), [&](const Memory::SubmittedJob& j) { return j.id == id; });
-  };
-  if (const auto* made = std::get_if<core::ResultMade>(&record)) memory_.results[made->key] = made->result;
-  if (const auto* failed = std::get_if<core::TaskFailed>(&record)) job(failed->job)->failures[failed->task] = *failed;
-  if (const auto* saved = std::get_if<core::RunSaved>(&record)) memory_.runs[saved->key] = *saved;
-  if (const auto* ended = std::get_if<core::RunEnded>(&record)) memory_.runs.erase(ended->key);
-  if (const auto* reserved = std::get_if<core::AttemptsReserved>(&record)) memory_.attempt_next = reserved->next;
-  if (const auto* cancelled = std::get_if<core::JobCancelled>(&record)) job(cancelled->job)->cancelled = true;
-  if (const auto* retried = std::get_if<core::JobRetried>(&record)) {
-    job(retried->job)->cancelled = false;
-    job(retried->job)->failures.clear();
-  }
+core::LookUpAnswered SimulatedFarm::Answer(const core::LookUp& look_up) const {
+  core::LookUpAnswered answer{.key = look_up.key};
+  if (!files_.contains(look_up.key)) return answer;
+  const auto recorded = memory_.results.find(look_up.key);
+  answer.recorded = recorded != memory_.results.end();
+  answer.result = answer.recorded ? recorded->second : core::Result{.sha256 = look_up.key, .size = 1};
+  return answer;
 }
 
-absl::Status SimulatedFarm::Plan(const Memory::SubmittedJob& job) {
+absl::Status SimulatedFarm::Plan(const SimulatedStore::SubmittedJob& job) {
   const std::vector<plan::PlannedFrame> known(frames_.begin(), frames_.begin() + static_cast<std::ptrdiff_t>(frames_known_));
   auto planned = plan::Plan(job.spec, known, closed_);
   if (!planned.ok()) return planned.status();
@@ -135,8 +136,9 @@ absl::Status SimulatedFarm::Plan(const Memory::SubmittedJob& job) {
 }
 
 absl::Status SimulatedFarm::Restart() {
-  for (const auto& [connection, stream] : std::map(to_worker_)) Break(connection);
-  answers_.clear();
+  for (const auto& [connection, stream] : std::map(to_worker_)) {
+    if (!to_replaced_.contains(connection)) Break(connection);
+  }
   for (auto file = files_.begin(); file != files_.end();) {
     if (!calm_ && accepted_.contains(*file) && Chance(weather_.file_lost)) {
       accepted_.erase(*file);
@@ -146,20 +148,25 @@ absl::Status SimulatedFarm::Restart() {
     }
   }
   now_ += absl::Milliseconds(static_cast<std::int64_t>(random_.Below(3000)));
+  return Lead();
+}
+
+absl::Status SimulatedFarm::Lead() {
+  term_ = memory_.Lead();
   state_ = core::State{};
-  // The restored events happen before anybody is served, so nothing may go wrong between them.
-  const double dies = std::exchange(weather_.scheduler_dies, 0);
+  answers_.clear();
+  starting_ = true;
   core::Restored restored{.attempt_next = memory_.attempt_next};
   for (const auto& [key, run] : memory_.runs) restored.runs.push_back(run);
   absl::Status status = Happen(std::move(restored));
   for (std::size_t i = 0; status.ok() && i < memory_.jobs.size(); ++i) {
-    const Memory::SubmittedJob job = memory_.jobs[i];
+    const SimulatedStore::SubmittedJob job = memory_.jobs[i];
     core::JobSubmitted submitted{.id = job.id, .name = "take", .user = job.user, .priority = job.priority, .cancelled = job.cancelled};
     for (const auto& [task, failure] : job.failures) submitted.failures.push_back(failure);
     status = Happen(std::move(submitted));
     if (status.ok()) status = Plan(job);
   }
-  weather_.scheduler_dies = dies;
+  starting_ = false;
   return status;
 }
 
@@ -186,6 +193,8 @@ void SimulatedFarm::Post(core::ConnectionId connection, core::Event event) {
 
 void SimulatedFarm::Connect(SimulatedWorker& worker) {
   worker.connection = ++last_connection_;
+  // Somebody may still know the old address.
+  if (replaced_ && Chance(0.2)) to_replaced_.insert(worker.connection);
   worker.beats_at = now_ + kHeartbeat;
   to_worker_[worker.connection];
   core::WorkerConnected hello{.connection = worker.connection, .worker = worker.name, .kinds = worker.kinds, .slots = worker.slots};
@@ -277,22 +286,17 @@ absl::Status SimulatedFarm::Deliver() {
   for (std::size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[random_.Below(i)]);
   for (const core::ConnectionId connection : order) {
     auto& stream = to_scheduler_[connection];
-    while (!stream.empty() && stream.front().at <= now_) {
+    const auto is_heard = [&] { return !replaced_ || !to_replaced_.contains(connection) || now_ >= replaced_->wakes_at; };
+    while (is_heard() && !stream.empty() && stream.front().at <= now_) {
       core::Event event = std::move(stream.front().event);
       stream.pop_front();
       const bool last = std::holds_alternative<core::WorkerDisconnected>(event);
-      RETURN_IF_ERROR(Happen(std::move(event)));
+      RETURN_IF_ERROR(to_replaced_.contains(connection) ? HappenToReplaced(std::move(event)) : Happen(std::move(event)));
       if (last) break;
     }
     if (stream.empty() && !to_worker_.contains(connection)) to_scheduler_.erase(connection);
   }
-  while (!answers_.empty()) {
-    const std::size_t which = random_.Below(answers_.size());
-    if (answers_[which].at > now_) break;
-    core::Event event = std::move(answers_[which].event);
-    answers_.erase(answers_.begin() + static_cast<std::ptrdiff_t>(which));
-    RETURN_IF_ERROR(Happen(std::move(event)));
-  }
+  RETURN_IF_ERROR(DeliverAnswers());
   for (const auto& [connection, unused] : std::map(to_worker_)) {
     auto stream = to_worker_.find(connection);
     while (stream != to_worker_.end() && !stream->second.empty() && stream->second.front().at <= now_) {
@@ -301,6 +305,17 @@ absl::Status SimulatedFarm::Deliver() {
       Receive(message);
       stream = to_worker_.find(connection);
     }
+  }
+  return absl::OkStatus();
+}
+
+absl::Status SimulatedFarm::DeliverAnswers() {
+  while (!answers_.empty()) {
+    const std::size_t which = random_.Below(answers_.size());
+    if (answers_[which].at > now_) break;
+    core::Event event = std::move(answers_[which].event);
+    answers_.erase(answers_.begin() + static_cast<std::ptrdiff_t>(which));
+    RETURN_IF_ERROR(Happen(std::move(event)));
   }
   return absl::OkStatus();
 }
@@ -317,7 +332,7 @@ absl::Status SimulatedFarm::ActAsUser() {
       if (before > 5) return absl::OkStatus();
       SubmitJobs();
       for (std::size_t i = before; i < memory_.jobs.size(); ++i) {
-        const Memory::SubmittedJob added = memory_.jobs[i];
+        const SimulatedStore::SubmittedJob added = memory_.jobs[i];
         RETURN_IF_ERROR(Happen(core::JobSubmitted{.id = added.id, .name = "take", .user = added.user, .priority = added.priority}));
         RETURN_IF_ERROR(Plan(added));
       }
@@ -334,9 +349,11 @@ absl::Status SimulatedFarm::Tick() {
     frames_known_ = std::min(frames_.size(), frames_known_ + 1 + random_.Below(3));
     if (calm_) frames_known_ = frames_.size();
     closed_ = frames_known_ == frames_.size() && (calm_ || Chance(0.5));
-    for (std::size_t i = 0; i < memory_.jobs.size(); ++i) RETURN_IF_ERROR(Plan(Memory::SubmittedJob(memory_.jobs[i])));
+    for (std::size_t i = 0; i < memory_.jobs.size(); ++i) RETURN_IF_ERROR(Plan(SimulatedStore::SubmittedJob(memory_.jobs[i])));
   }
   if (!calm_ && Chance(weather_.user_acts)) RETURN_IF_ERROR(ActAsUser());
+  if (!calm_ && Chance(weather_.leader_replaced)) RETURN_IF_ERROR(Replace());
+  RETURN_IF_ERROR(MoveReplaced());
   for (SimulatedWorker& worker : workers_) MoveWorker(worker);
   RETURN_IF_ERROR(Deliver());
   return Happen(core::Tick{});
@@ -352,7 +369,7 @@ bool SimulatedFarm::IsOver() const {
 
 absl::Status SimulatedFarm::CheckEnd() const {
   if (const absl::Status status = core::Check(state_); !status.ok()) return Wrong(std::string(status.message()));
-  for (const Memory::SubmittedJob& submitted : memory_.jobs) {
+  for (const SimulatedStore::SubmittedJob& submitted : memory_.jobs) {
     const core::Job* job = core::FindJob(state_, submitted.id);
     if (!job) return Wrong(fmt::format("{} is not known", submitted.id));
     const core::Phase phase = core::PhaseOf(*job);
@@ -376,9 +393,10 @@ absl::Status SimulatedFarm::CheckEnd() const {
 }
 
 absl::Status SimulatedFarm::Run() {
+  term_ = memory_.Lead();
   RETURN_IF_ERROR(Happen(core::Restored{}));
   for (std::size_t i = 0; i < memory_.jobs.size(); ++i) {
-    const Memory::SubmittedJob job = memory_.jobs[i];
+    const SimulatedStore::SubmittedJob job = memory_.jobs[i];
     RETURN_IF_ERROR(Happen(core::JobSubmitted{.id = job.id, .name = "take", .user = job.user, .priority = job.priority}));
   }
   while (!IsOver()) {

@@ -13,9 +13,10 @@
 #include "scheduler/core/step.h"
 #include "scheduler/plan/plan.h"
 #include "services/base/random.h"
+#include "tests/scenario/simulated_store.h"
 
-/// A farm in one thread: the scheduler's core, what its store remembers, an artifact folder, workers that die and hang, and a network that
-/// loses, doubles and delays. Everything follows from the seed.
+/// A farm in one thread: the scheduler's core, what its store remembers, an artifact folder, workers that die and hang, a network that loses,
+/// doubles and delays, and a leader that another has replaced but that goes on. Everything follows from the seed.
 namespace vorocast::scenario {
 
 /// How often what goes wrong, each in [0, 1] per occasion.
@@ -28,24 +29,10 @@ struct Weather {
   double attempt_fails = 0;    // for a cause drawn at random
   double bad_frame = 0;        // a frame that fails on every attempt
   double scheduler_dies = 0;   // a commit, before or after it
+  double commit_unknown = 0;   // a commit: it is written, but the scheduler is told that it timed out
+  double leader_replaced = 0;  // a tick: another scheduler leads, while this one was stopped and does not know
   double file_lost = 0;        // a restart of the scheduler, per result
   double user_acts = 0;        // a tick: cancels, retries, submits again
-};
-
-/// What the store remembers, as a plain map; survives the scheduler.
-struct Memory {
-  struct SubmittedJob {
-    std::string id;
-    std::string user;
-    std::int32_t priority = 0;
-    plan::JobSpec spec;
-    bool cancelled = false;
-    std::map<std::string, core::TaskFailed> failures;
-  };
-  std::vector<SubmittedJob> jobs;
-  std::map<base::Digest, core::Result> results;
-  std::map<base::Digest, core::RunSaved> runs;
-  std::int64_t attempt_next = 1;
 };
 
 class SimulatedFarm {
@@ -56,6 +43,8 @@ class SimulatedFarm {
   absl::Status Run();
 
   std::int64_t steps() const { return steps_; }
+  /// Writes of replaced leaders, all of them refused.
+  std::int64_t refused() const { return refused_; }
 
  private:
   struct Attempt {
@@ -85,17 +74,37 @@ class SimulatedFarm {
     core::Message message;
   };
 
+  /// A scheduler that led before, and does not know yet that it leads no more.
+  struct Replaced {
+    std::int64_t term = 0;
+    core::State state;
+    std::deque<ToScheduler> answers;
+    absl::Time wakes_at;
+    absl::Time learns_at;  // at the latest
+  };
+
   bool Chance(double probability) { return random_.Uniform() < probability; }
   absl::Duration Delay() { return absl::Milliseconds(1 + static_cast<std::int64_t>(random_.Below(50))); }
 
   void SubmitJobs();
   absl::Status Happen(core::Event event);
+  absl::Status Check(const core::State& state) const;
   absl::Status Apply(core::Effects effects);
-  void Remember(const core::Record& record);
+  absl::Status Commit(const std::vector<core::Record>& records);
+  void Send(std::vector<core::Message> messages);
+  core::LookUpAnswered Answer(const core::LookUp& look_up) const;
   absl::Status Restart();
-  absl::Status Plan(const Memory::SubmittedJob& job);
+  absl::Status Lead();
+  absl::Status Plan(const SimulatedStore::SubmittedJob& job);
+
+  // A leader that was replaced (simulated_takeover.cpp).
+  absl::Status Replace();
+  absl::Status HappenToReplaced(core::Event event);
+  absl::Status MoveReplaced();
+  void EndReplaced();
 
   absl::Status Deliver();
+  absl::Status DeliverAnswers();
   absl::Status Tick();
   void MoveWorker(SimulatedWorker& worker);
   void Connect(SimulatedWorker& worker);
@@ -121,8 +130,12 @@ class SimulatedFarm {
   bool closed_ = false;
 
   core::State state_;
-  bool scheduler_up_ = true;
-  Memory memory_;
+  bool starting_ = false;  // nothing goes wrong while a leader takes up what the store remembers, as nobody is served yet
+  std::int64_t term_ = 0;
+  SimulatedStore memory_;
+  std::optional<Replaced> replaced_;
+  std::set<core::ConnectionId> to_replaced_;  // streams that end there, or ended there before it was gone
+  std::int64_t refused_ = 0;
   std::set<base::Digest> files_;                   // results in the artifact folder
   std::map<base::Digest, std::int32_t> accepted_;  // how often a result was taken for a key since its file was last lost
   core::ConnectionId last_connection_ = 0;
