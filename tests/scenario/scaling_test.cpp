@@ -12,9 +12,16 @@ FarmTimes Times() {
   return times;
 }
 
-TEST(Scaling, OneWorkerIsNeverIdle) {
+plan::JobSpec TrackedOnly() {
   plan::JobSpec job;
   job.sheets = false;
+  job.window_frames = 10;
+  job.overlap_frames = 3;
+  return job;
+}
+
+TEST(Scaling, OneWorkerIsNeverIdle) {
+  const plan::JobSpec job = TrackedOnly();
   const auto run = RunClockedFarm(job, 100, 1, Times());
   ASSERT_TRUE(run.ok()) << run.status();
   // 100 frames, the template, two stretches, the guide, 14 windows, the assembly; each a second.
@@ -25,8 +32,7 @@ TEST(Scaling, OneWorkerIsNeverIdle) {
 }
 
 TEST(Scaling, ManyWorkersWaitForTheLongestChainOnly) {
-  plan::JobSpec job;
-  job.sheets = false;
+  const plan::JobSpec job = TrackedOnly();
   const auto run = RunClockedFarm(job, 100, 1000, Times());
   ASSERT_TRUE(run.ok()) << run.status();
   // A frame, the template or a stretch, the guide, a window, the assembly.
@@ -35,8 +41,7 @@ TEST(Scaling, ManyWorkersWaitForTheLongestChainOnly) {
 }
 
 TEST(Scaling, ATaskMayTakeLongerThanALeaseLasts) {
-  plan::JobSpec job;
-  job.sheets = false;
+  const plan::JobSpec job = TrackedOnly();
   FarmTimes times = Times();
   times.of[static_cast<std::size_t>(tasks::Kind::kAssemble)].start_s = 100;
   const auto run = RunClockedFarm(job, 100, 1000, times);

@@ -32,6 +32,9 @@ constexpr double kFramesPerSecond = 25;
 
 /// Half axes of the egg, metres: all different, so that every turn shows.
 const Vec3 kHalfAxes(0.30, 0.60, 0.18);
+/// Of a cell's place, metres: a thirtieth of the egg. An ellipsoid has no relief and can slide within itself by maps that stretch, which tracking
+/// allows (docs/decisions/0008); here it is only shown that everything moves along, and precision is shown where tracking is tested.
+constexpr double kSlack = 0.02;
 
 Rigid3 WorldFromEgg(std::int32_t frame) {
   return {geometry::Quat(Eigen::AngleAxisd(0.04 * frame, Vec3::UnitY())), Vec3(0.02 * frame, 1, 0.01 * frame)};
@@ -181,7 +184,7 @@ TEST_F(ExecutorsTest, ATakeGoesThroughTheWholeGraph) {
     for (std::size_t c = 0; c < take.cell_count(); ++c) {
       error += (take.CellPose(f, c) * model.cells.centroid[c] - world_from_template * model.cells.centroid[c]).norm();
     }
-    EXPECT_LT(error / static_cast<double>(take.cell_count()), 0.006) << "frame " << f;
+    EXPECT_LT(error / static_cast<double>(take.cell_count()), kSlack) << "frame " << f;
     EXPECT_EQ(take.patches.state[f] == geometry::FrameState::kInterpolated, static_cast<std::int32_t>(f) == kBadFrame);
   }
 
@@ -206,7 +209,7 @@ TEST_F(ExecutorsTest, ATakeGoesThroughTheWholeGraph) {
     for (std::size_t c = 0; c < take.cell_count(); ++c) {
       error += (window.Pose(f, model.patch[c]) * model.cells.centroid[c] - world_from_template * model.cells.centroid[c]).norm();
     }
-    EXPECT_LT(error / static_cast<double>(take.cell_count()), 0.006) << "frame " << window.frames[f];
+    EXPECT_LT(error / static_cast<double>(take.cell_count()), kSlack) << "frame " << window.frames[f];
   }
 
   // A stretch of bad frames stands still.
