@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <utility>
 
+#include <spdlog/spdlog.h>
+
 #include "scheduler/fleet/local_fleet.h"
 #include "scheduler/fleet/slurm_fleet.h"
 
@@ -82,6 +84,7 @@ absl::StatusOr<std::vector<std::unique_ptr<Fleet>>> FleetFlags::Start(const std:
   if (kind_ == "slurm") {
     ASSIGN_OR_RETURN(fleets.emplace_back(), StartSlurm(state, address, std::move(demand)));
   }
+  for (const auto& fleet : fleets) spdlog::info("fleet: {}", fleet->Describe());
   return fleets;
 }
 

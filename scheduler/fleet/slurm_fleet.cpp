@@ -96,6 +96,7 @@ void SlurmFleet::Watch() {
     const absl::Status status = Round();
     pause = status.ok() ? options_.poll : std::min(2 * pause, options_.pause_max);
     Note(status, pause);
+    WriteStatus();
     lock.lock();
     wake_.wait_for(lock, absl::ToChronoMilliseconds(pause), [this] { return stopping_; });
   }
@@ -111,6 +112,20 @@ void SlurmFleet::Note(const absl::Status& status, absl::Duration pause) {
   trouble_ = fmt::format("{}; tries again every {}", std::string(status.message()), absl::FormatDuration(pause));
   // The pauses grow, so that these lines stay few.
   spdlog::warn("slurm fleet: {}", trouble_);
+}
+
+void SlurmFleet::WriteStatus() {
+  const std::string text = Describe();
+  if (text == written_) return;
+  const std::filesystem::path path = options_.state / "slurm" / "status.txt";
+  const std::filesystem::path temporary = options_.state / "slurm" / "status.txt.new";
+  std::ofstream file(temporary);
+  file << text << "\n";
+  file.close();
+  std::error_code error;
+  std::filesystem::rename(temporary, path, error);
+  // A full disk is told of by others; the next round tries again.
+  if (file && !error) written_ = text;
 }
 
 absl::Status SlurmFleet::Round() {

@@ -20,7 +20,7 @@
 namespace vorocast::fleet {
 
 struct SlurmFleetOptions {
-  std::filesystem::path state;     // shared by all machines: slurm/worker.sh, logs/slurm-JOB_TASK.log
+  std::filesystem::path state;     // shared by all machines: slurm/worker.sh, slurm/status.txt, logs/slurm-JOB_TASK.log
   std::string scheduler;           // what workers connect to, HOST:PORT; several separated by commas
   std::filesystem::path worker;    // vorocast-worker, as the nodes see it
   std::string partition;           // empty: Slurm's default
@@ -39,7 +39,7 @@ struct SlurmFleetOptions {
 
 /// Long-lived workers as elements of job arrays on a Slurm cluster. All carry one job name, which stands for the state folder, so that a scheduler
 /// which takes over finds those of the one before. Slurm's word counts for how many there are and will be, and for nothing else. When Slurm does
-/// not answer, nothing is asked for or drained, and the pauses between attempts grow.
+/// not answer, it says so in the log and in slurm/status.txt, nothing is asked for or drained, and the pauses between attempts grow.
 class SlurmFleet final : public Fleet {
  public:
   /// UNAVAILABLE when the state folder cannot be written. Whether Slurm answers does not matter.
@@ -61,11 +61,13 @@ class SlurmFleet final : public Fleet {
   absl::Status Drain(const std::vector<SlurmMember>& up, const Demand& demand, std::int32_t count);
   absl::StatusOr<std::string> Run(const std::vector<std::string>& arguments) const { return options_.run(arguments); }
   void Note(const absl::Status& status, absl::Duration pause);
+  void WriteStatus();
 
   const SlurmFleetOptions options_;
   const std::string job_name_;
   // The watching thread's.
   std::optional<absl::Time> deadline_;  // of the work that there is
+  std::string written_;                 // into status.txt
   std::optional<absl::Time> surplus_since_;
   absl::Time next_ask_ = absl::InfinitePast();
   absl::Duration ask_pause_;

@@ -6,9 +6,11 @@
 #include <unistd.h>
 
 #include <filesystem>
+#include <fstream>
 #include <functional>
 #include <map>
 #include <mutex>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -187,6 +189,9 @@ TEST_F(SlurmFleetTest, SaysThatSlurmIsDownAndGoesOnWhenItIsBack) {
   ASSERT_TRUE(Await([&] { return fleet_->Describe().find("Unable to contact") != std::string::npos; }));
   ASSERT_TRUE(AwaitRounds(3));
   EXPECT_EQ(slurm_.Count("sbatch"), 0u);
+  std::stringstream told;
+  told << std::ifstream(state_ / "slurm" / "status.txt").rdbuf();
+  EXPECT_THAT(told.str(), HasSubstr("Unable to contact"));
   slurm_.set_down(false);
   ASSERT_TRUE(Await([&] { return slurm_.size() == 3; }));
   ASSERT_TRUE(Await([&] { return fleet_->Describe() == "Slurm: 0 workers up, 3 queued, at most 4"; })) << fleet_->Describe();
