@@ -30,11 +30,11 @@ constexpr double kGoalEfficiency = 0.8;
 FarmTimes Measured() {
   FarmTimes times;
   const auto set = [&](tasks::Kind kind, const scenario::TaskTime& time) { times.of[static_cast<std::size_t>(kind)] = time; };
-  set(tasks::Kind::kTessellate, {.start_s = 1.10, .spread = 0.10});
-  set(tasks::Kind::kTemplate, {.start_s = 3.6, .per_input_s = 0.001, .spread = 0.10});
-  set(tasks::Kind::kStretch, {.start_s = 0.10, .per_input_s = 0.050, .spread = 0.10});
-  set(tasks::Kind::kGuide, {.start_s = 0.10, .per_input_s = 0.006, .spread = 0.10});
-  set(tasks::Kind::kTrack, {.start_s = 0.10, .per_input_s = 0.065, .spread = 0.10});
+  set(tasks::Kind::kTessellate, {.start_s = 0.80, .spread = 0.10});
+  set(tasks::Kind::kTemplate, {.start_s = 1.9, .per_input_s = 0.001, .spread = 0.10});
+  set(tasks::Kind::kStretch, {.start_s = 0.10, .per_input_s = 0.092, .spread = 0.10});
+  set(tasks::Kind::kGuide, {.start_s = 0.10, .per_input_s = 0.012, .spread = 0.10});
+  set(tasks::Kind::kTrack, {.start_s = 0.10, .per_input_s = 0.091, .spread = 0.10});
   set(tasks::Kind::kAssemble, {.start_s = 0.05, .per_input_s = 0.0135, .spread = 0.05});
   return times;
 }

@@ -88,6 +88,7 @@ absl::Status MakeCapture(const TakeSize& size, const std::filesystem::path& fold
 
 absl::StatusOr<double> SecondsOf(const std::vector<std::string>& command, const std::filesystem::path& log) {
   const auto begin = std::chrono::steady_clock::now();
+  std::fflush(stdout);  // else the child would print it too
   const pid_t child = fork();
   if (child < 0) return absl::ResourceExhaustedError("no process can be started");
   if (child == 0) {
