@@ -12,6 +12,7 @@
 #include <variant>
 #include <vector>
 
+#include "absl/container/btree_map.h"
 #include "absl/container/flat_hash_map.h"
 #include "absl/time/time.h"
 #include "scheduler/core/block_table.h"
@@ -163,11 +164,11 @@ struct State {
   std::vector<Job> jobs;
   absl::flat_hash_map<std::string, JobIndex> job_by_id;
   BlockTable<Task> tasks;
-  std::vector<Run> runs;
+  BlockTable<Run> runs;
   std::vector<RunIndex> free_runs;
-  absl::flat_hash_map<base::Digest, RunIndex> run_by_key;
-  std::map<base::Digest, Tries> tries_before;         // a restart's memory of runs that nobody held
-  absl::Time adoption_ends = absl::InfiniteFuture();  // afterwards what a restart remembered and nobody wants is forgotten
+  absl::btree_map<base::Digest, RunIndex> run_by_key;  // a hash table of a million entries stops everybody when it grows
+  std::map<base::Digest, Tries> tries_before;          // a restart's memory of runs that nobody held
+  absl::Time adoption_ends = absl::InfiniteFuture();   // afterwards what a restart remembered and nobody wants is forgotten
   std::vector<Worker> workers;
   std::vector<WorkerIndex> free_workers;
   absl::flat_hash_map<std::string, WorkerIndex> worker_by_name;

@@ -105,7 +105,7 @@ void Transition::Want(TaskIndex index) {
   }
   RunIndex run_index = static_cast<RunIndex>(state_.runs.size());
   if (state_.free_runs.empty()) {
-    state_.runs.emplace_back();
+    state_.runs.push_back({});
   } else {
     run_index = state_.free_runs.back();
     state_.free_runs.pop_back();
