@@ -10,6 +10,7 @@
 #include <optional>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
 #include "services/rendering/film_camera.h"
@@ -99,7 +100,9 @@ void JobFlags::AddTo(CLI::App& command) {
   command.add_option("--window", window, "Frames tracked together")->capture_default_str()->check(CLI::Range(2, 1000));
   command.add_option("--bad-frames", bad_frames_max, "Frames that may fail and be interpolated before the job fails (a tenth of the take)")
       ->check(CLI::NonNegativeNumber);
-  command.add_option("--effect", effect, "Effect to simulate: a shipped one (calm, pendulum, release) or a JSON file (docs/effects.md)");
+  command.add_option(
+      "--effect", effect,
+      fmt::format("Effect to simulate: a JSON file (docs/effects.md), or a shipped one: {}", fmt::join(simulation::ShippedEffects(), ", ")));
   command.add_option("--indicator", indicator, "How points become a volume: spectral, or cgal (the slow reference)")
       ->capture_default_str()
       ->check(CLI::IsMember({"spectral", "cgal"}));
