@@ -146,7 +146,9 @@ absl::Status SchedulerClient::UploadBlob(const v1::Blob& blob, const std::filesy
   return WithLeader([&](const Scheduler& scheduler) { return UploadOnce(*scheduler.captures, blob, path); });
 }
 
-absl::StatusOr<v1::Job> SchedulerClient::Submit(const v1::SubmitJobRequest& request) { return Call(&Scheduler::jobs, &v1::Jobs::Stub::Submit, request); }
+absl::StatusOr<v1::Job> SchedulerClient::Submit(const v1::SubmitJobRequest& request) {
+  return Call(&Scheduler::jobs, &v1::Jobs::Stub::Submit, request);
+}
 
 absl::StatusOr<v1::Job> SchedulerClient::Get(const std::string& job_id) {
   v1::JobRequest request;

@@ -51,10 +51,11 @@ class SchedulerClient {
   absl::Status UploadBlob(const v1::Blob& blob, const std::filesystem::path& path);
   absl::Status FetchOnce(const std::string& job_id, const v1::Output& output, const std::filesystem::path& path);
   /// Calls `call` with the scheduler in use, and while that is UNAVAILABLE with the next one, for a while.
-  absl::Status WithLeader(const std::function<absl::Status(const Scheduler&)>& call, const std::function<bool()>& interrupted = [] { return false; });
+  absl::Status WithLeader(
+      const std::function<absl::Status(const Scheduler&)>& call, const std::function<bool()>& interrupted = [] { return false; });
   template <typename Service, typename Request, typename Reply>
-  absl::StatusOr<Reply> Call(std::unique_ptr<Service> Scheduler::*service, grpc::Status (Service::*method)(grpc::ClientContext*, const Request&, Reply*),
-                             const Request& request);
+  absl::StatusOr<Reply> Call(std::unique_ptr<Service> Scheduler::*service,
+                             grpc::Status (Service::*method)(grpc::ClientContext*, const Request&, Reply*), const Request& request);
 
   std::string address_;
   std::vector<Scheduler> schedulers_;

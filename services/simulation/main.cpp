@@ -73,7 +73,8 @@ int main(int argc, char** argv) {
   base::RequireProcessor();
   CLI::App app(kStory, "vorocast-simulation");
   Options options;
-  app.add_option("--scheduler", options.lease.scheduler, "Takes tasks from here: HOST:PORT or unix:/PATH; A,B where one stands by")->envname("VOROCAST_SCHEDULER");
+  app.add_option("--scheduler", options.lease.scheduler, "Takes tasks from here: HOST:PORT or unix:/PATH; A,B where one stands by")
+      ->envname("VOROCAST_SCHEDULER");
   CLI::Option* listen =
       app.add_option("--listen", options.listen, "Answers gRPC here: HOST:PORT, port 0 for any free one, or unix:/PATH. The address is printed");
   CLI::Option* store = app.add_option("--store", options.store, "The artifact folder for runs asked for over --listen");

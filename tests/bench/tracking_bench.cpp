@@ -192,8 +192,8 @@ void Run(const std::string& what, KnownTake take, std::int32_t template_frame, b
   result.quality = PrintErrors("windows", tracked, take, track_seconds);
   const double seconds = (guide_seconds + track_seconds + assemble_seconds) / static_cast<double>(take.frames.size());
   fmt::print("{:<10} {:8.2f} {:>8} {:8.2f} {:>8}  {:>9}  {:9.4f}\n", "goal", kGoalMeanMm, "", kGoalHighMm, "", "", kGoalSeconds);
-  fmt::print("all of it {:.4f} s a frame, {:.2f} of the goal; windows of {} share {} frame, tracked twice\n", seconds,
-             seconds / kGoalSeconds, kWindow, kOverlap);
+  fmt::print("all of it {:.4f} s a frame, {:.2f} of the goal; windows of {} share {} frame, tracked twice\n", seconds, seconds / kGoalSeconds,
+             kWindow, kOverlap);
   result.name = "tracking-65k";
   result.input = fmt::format("{}, frames {} to {}, {} points, 1 mm noise, {} cells, {} patches; seconds a frame, guide and assembly included", what,
                              take.frames.front().frame, take.frames.back().frame, kPoints, model.cells.size(), model.patch_count);

@@ -29,7 +29,8 @@ int main(int argc, char** argv) {
   CLI::App app(kStory, "vorocast-worker");
   lease::LeaseLoopOptions options;
   options.slots = static_cast<std::int32_t>(std::max(1u, std::thread::hardware_concurrency()));
-  app.add_option("--scheduler", options.scheduler, "The scheduler's address: HOST:PORT or unix:/PATH; A,B where one stands by")->envname("VOROCAST_SCHEDULER");
+  app.add_option("--scheduler", options.scheduler, "The scheduler's address: HOST:PORT or unix:/PATH; A,B where one stands by")
+      ->envname("VOROCAST_SCHEDULER");
   lease::LeaseFlags flags;
   flags.AddTo(app, options, "Tasks at once");
   CLI::App* execute_task = app.add_subcommand("execute-task", "Runs one task given on standard input; the worker starts this itself");
