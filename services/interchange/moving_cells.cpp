@@ -74,6 +74,7 @@ absl::StatusOr<MovingCells> ReadMovingCells(const fs::path& take, const fs::path
   if (simulated.cell_state.size() != simulated.time.size() * moving.cell_count()) {
     return absl::InvalidArgumentError(fmt::format("{} has not the cells of {}; give the take that it was run on", path.string(), beside.string()));
   }
+  if (simulated.time.empty()) return absl::InvalidArgumentError(fmt::format("{} holds no instant; there is nothing to export", path.string()));
   moving.time = std::move(simulated.time);
   moving.rotation = std::move(simulated.cell_rotation);
   moving.translation = std::move(simulated.cell_translation);

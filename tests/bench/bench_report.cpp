@@ -78,4 +78,12 @@ absl::Status BenchReport::Write() const {
   return absl::OkStatus();
 }
 
+int RunBench(const char* program, int argc, char** argv, absl::Status (*measure)(BenchReport&)) {
+  BenchReport report(argc, argv);
+  absl::Status status = measure(report);
+  if (status.ok()) status = report.Write();
+  if (!status.ok()) fmt::print(stderr, "{}: {}\n", program, std::string(status.message()));
+  return status.ok() ? 0 : 1;
+}
+
 }  // namespace vorocast::bench

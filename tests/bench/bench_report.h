@@ -49,4 +49,7 @@ class BenchReport {
   std::vector<BenchCase> cases_;
 };
 
+/// What a benchmark's main does: measures, writes what `--json` asks for, and tells on standard error what went wrong. The program's exit code.
+int RunBench(const char* program, int argc, char** argv, absl::Status (*measure)(BenchReport&));
+
 }  // namespace vorocast::bench

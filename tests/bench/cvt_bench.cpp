@@ -253,15 +253,10 @@ absl::Status Bench(BenchReport& report) {
     RETURN_IF_ERROR(BenchScan(report));
     for (const std::int32_t count : {5000, 14'455}) RETURN_IF_ERROR(BenchBox(count, report));
   }
-  return report.Write();
+  return absl::OkStatus();
 }
 
 }  // namespace
 }  // namespace vorocast::bench
 
-int main(int argc, char** argv) {
-  vorocast::bench::BenchReport report(argc, argv);
-  const absl::Status status = vorocast::bench::Bench(report);
-  if (!status.ok()) fmt::print(stderr, "bench_cvt: {}\n", std::string(status.message()));
-  return status.ok() ? 0 : 1;
-}
+int main(int argc, char** argv) { return vorocast::bench::RunBench("bench_cvt", argc, argv, vorocast::bench::Bench); }

@@ -83,10 +83,4 @@ absl::Status Run(BenchReport& report) {
 }  // namespace
 }  // namespace vorocast::bench
 
-int main(int argc, char** argv) {
-  vorocast::bench::BenchReport report(argc, argv);
-  absl::Status status = vorocast::bench::Run(report);
-  if (status.ok()) status = report.Write();
-  if (!status.ok()) fmt::print(stderr, "bench_film: {}\n", std::string(status.message()));
-  return status.ok() ? 0 : 1;
-}
+int main(int argc, char** argv) { return vorocast::bench::RunBench("bench_film", argc, argv, vorocast::bench::Run); }

@@ -77,15 +77,10 @@ absl::Status Bench(BenchReport& report) {
   } else {
     report.Skip("indicator-kinoptic", std::string(kinoptic.status().message()));
   }
-  return report.Write();
+  return absl::OkStatus();
 }
 
 }  // namespace
 }  // namespace vorocast::bench
 
-int main(int argc, char** argv) {
-  vorocast::bench::BenchReport report(argc, argv);
-  const absl::Status status = vorocast::bench::Bench(report);
-  if (!status.ok()) fmt::print(stderr, "bench_indicator: {}\n", std::string(status.message()));
-  return status.ok() ? 0 : 1;
-}
+int main(int argc, char** argv) { return vorocast::bench::RunBench("bench_indicator", argc, argv, vorocast::bench::Bench); }

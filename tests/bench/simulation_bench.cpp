@@ -100,15 +100,10 @@ absl::Status Bench(BenchReport& report) {
                                   {"sim-falling", "all released at once, falling", testing::Still, all, 0.1, 0.7, 0.080},
                                   {"sim-pile", "all in a pile", testing::Still, all, 1.2, 2.2, 0.080}};
   for (const Situation& situation : situations) RETURN_IF_ERROR(Measure(cells, situation, report));
-  return report.Write();
+  return absl::OkStatus();
 }
 
 }  // namespace
 }  // namespace vorocast::bench
 
-int main(int argc, char** argv) {
-  vorocast::bench::BenchReport report(argc, argv);
-  const absl::Status status = vorocast::bench::Bench(report);
-  if (!status.ok()) fmt::print(stderr, "bench_simulation: {}\n", std::string(status.message()));
-  return status.ok() ? 0 : 1;
-}
+int main(int argc, char** argv) { return vorocast::bench::RunBench("bench_simulation", argc, argv, vorocast::bench::Bench); }

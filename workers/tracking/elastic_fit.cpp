@@ -334,12 +334,7 @@ FitQuality ElasticFit::Measure(const ObservedFrame& frame, const ElasticStage& s
     const double across = (normal + partner.point->normal).normalized().dot(partner.point->position - x);
     plane_squared += across * across;
   }
-  FitQuality quality;
-  if (seen == 0) return quality;
-  quality.confidence = static_cast<double>(found) / static_cast<double>(seen);
-  quality.squared_mean = capped / static_cast<double>(seen);
-  if (found > 0) quality.residual_m = std::sqrt(plane_squared / static_cast<double>(found));
-  return quality;
+  return QualityOf(seen, found, capped, plane_squared);
 }
 
 }  // namespace vorocast::tracking

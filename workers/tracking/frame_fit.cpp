@@ -182,6 +182,10 @@ FitQuality FrameFit::Measure(const ObservedFrame& frame, const FitStage& stage, 
     const double across = (normal + nearest->normal).normalized().dot(nearest->position - x);
     plane_squared += across * across;
   }
+  return QualityOf(seen, found, capped, plane_squared);
+}
+
+FitQuality QualityOf(std::size_t seen, std::size_t found, double capped, double plane_squared) {
   FitQuality quality;
   if (seen == 0) return quality;
   quality.confidence = static_cast<double>(found) / static_cast<double>(seen);

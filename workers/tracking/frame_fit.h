@@ -30,6 +30,10 @@ struct FitQuality {
   double squared_mean = 0;  // mean squared distance of the surface points to their best partner, at most (2 σ)² each, m²: lower is a better pose
 };
 
+/// A fit's quality from what was counted over the surface points: how many there were and how many found a partner, the sum of the squared distances
+/// to the best partner (capped), and of the squared point-to-plane distances to those found.
+FitQuality QualityOf(std::size_t seen, std::size_t found, double capped, double plane_squared);
+
 /// Fits one frame at a time to a template: soft ICP with one Gauss–Newton step a call (paper, sections 4.1–4.4). Keeps its scratch between calls;
 /// results depend on the arguments alone.
 class FrameFit {
