@@ -101,7 +101,7 @@ grpc::ServerUnaryReactor* JobsService::Cancel(grpc::CallbackServerContext* conte
   });
 }
 
-grpc::ServerUnaryReactor* JobsService::Retry(grpc::CallbackServerContext* context, const v1::JobRequest* request, v1::Job* reply) {
+grpc::ServerUnaryReactor* JobsService::Retry(grpc::CallbackServerContext* context, const v1::RetryJobRequest* request, v1::Job* reply) {
   return AnswerInTurn<v1::Job>(context, engine_, reply, [this, request](Turn& turn, v1::Job& job) -> absl::Status {
     RETURN_IF_ERROR(catalogue_.Retry(turn, request->job_id()));
     return Show(turn, request->job_id(), job);

@@ -27,7 +27,7 @@ class JobsService final : public v1::Jobs::CallbackService {
   grpc::ServerWriteReactor<v1::Job>* Watch(grpc::CallbackServerContext* context, const v1::JobRequest* request) override;
   grpc::ServerUnaryReactor* Explain(grpc::CallbackServerContext* context, const v1::ExplainRequest* request, v1::ExplainReply* reply) override;
   grpc::ServerUnaryReactor* Cancel(grpc::CallbackServerContext* context, const v1::JobRequest* request, v1::Job* reply) override;
-  grpc::ServerUnaryReactor* Retry(grpc::CallbackServerContext* context, const v1::JobRequest* request, v1::Job* reply) override;
+  grpc::ServerUnaryReactor* Retry(grpc::CallbackServerContext* context, const v1::RetryJobRequest* request, v1::Job* reply) override;
   grpc::ServerWriteReactor<v1::FetchChunk>* Fetch(grpc::CallbackServerContext* context, const v1::FetchRequest* request) override;
 
  private:

@@ -170,7 +170,7 @@ absl::StatusOr<v1::Job> SchedulerClient::Cancel(const std::string& job_id) {
 }
 
 absl::StatusOr<v1::Job> SchedulerClient::Retry(const std::string& job_id) {
-  v1::JobRequest request;
+  v1::RetryJobRequest request;
   request.set_job_id(job_id);
   return Call(&Scheduler::jobs, &v1::Jobs::Stub::Retry, request);
 }

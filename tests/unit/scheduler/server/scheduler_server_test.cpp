@@ -268,7 +268,9 @@ TEST_F(SchedulerServerTest, CancelAndRetry) {
   EXPECT_EQ(Get(job->id())->stages(0).done(), 6);
   worker_->Release();
   // The job had ended and is planned anew, which the answer does not wait for.
-  EXPECT_EQ((Call<v1::Jobs::StubInterface>(*jobs_, &v1::Jobs::StubInterface::Retry, request)->state()), v1::BLOCKED);
+  v1::RetryJobRequest retry;
+  retry.set_job_id(job->id());
+  EXPECT_EQ((Call<v1::Jobs::StubInterface>(*jobs_, &v1::Jobs::StubInterface::Retry, retry)->state()), v1::BLOCKED);
   EXPECT_EQ(WatchToEnd(job->id())->state(), v1::DONE);
   EXPECT_EQ(worker_->executed()["frame 0: tessellate"], 1);
 }
@@ -313,7 +315,7 @@ TEST_F(SchedulerServerTest, ARetryMakesLostAndDamagedResultsAgain) {
   std::filesystem::permissions(path_of("tracked.h5"), std::filesystem::perms::owner_all);
   std::ofstream(path_of("tracked.h5")) << "Assemble";  // as long as before
   const auto retry = [&] {
-    v1::JobRequest request;
+    v1::RetryJobRequest request;
     request.set_job_id(job->id());
     return Call<v1::Jobs::StubInterface>(*jobs_, &v1::Jobs::StubInterface::Retry, request);
   };
