@@ -27,6 +27,7 @@ struct Tries {
   std::int32_t failed = 0;         // attempts whose own doing it was
   std::int32_t interrupted = 0;    // attempts that the machines around it ended
   std::int32_t memory_raised = 0;  // how often the memory limit was doubled
+  std::int32_t time_raised = 0;    // how often the time limit was doubled
 };
 
 struct Verdict {

@@ -34,6 +34,8 @@ struct JobSubmitted {
   std::string name;  // of the take, for people
   std::string user;
   std::int32_t priority = 0;  // larger first
+  JobTerms terms{};
+  bool paused = false;
   // After a restart: what became of it before.
   bool cancelled = false;
   std::vector<TaskFailed> failures;

@@ -38,6 +38,8 @@ struct RunSaved {
   std::int64_t attempt = 0;
   std::string worker;  // empty: nobody holds it
   Tries tries;
+  std::int64_t copy_attempt = 0;  // the second attempt at a task that takes long
+  std::string copy_worker{};      // empty: there is none
 };
 struct RunEnded {
   base::Digest key;
@@ -53,7 +55,25 @@ struct JobCancelled {
 struct JobRetried {
   std::string job;
 };
+struct JobPaused {
+  std::string job;
+  bool paused = true;  // false: it goes on
+};
+/// The limits of the job's next attempts.
+struct JobLimited {
+  std::string job;
+  std::int64_t memory_limit = 0;  // as in JobTerms
+  double time_factor = 1;
+};
 
-using Record = std::variant<ResultMade, TaskFailed, RunSaved, RunEnded, AttemptsReserved, JobCancelled, JobRetried>;
+/// What a user asks of a job besides its results: they decide when it runs and how far its tasks may go, and nothing of what is computed.
+struct JobTerms {
+  std::int32_t workers_max = 0;   // attempts of this job that run at once; 0: any number
+  double deadline = 0;            // seconds since 1970 by which it should have ended; 0: none
+  std::int64_t memory_limit = 0;  // bytes a task may take; 0: the service's own limit
+  double time_factor = 1;         // the usual time limits times this
+};
+
+using Record = std::variant<ResultMade, TaskFailed, RunSaved, RunEnded, AttemptsReserved, JobCancelled, JobRetried, JobPaused, JobLimited>;
 
 }  // namespace vorocast::core

@@ -22,7 +22,15 @@ absl::StatusOr<v1::Job> Read(const Catalogue& catalogue, const std::string& job)
 
 }  // namespace
 
+void Archive::NoteEnds(const Turn& turn, const std::set<std::string>& jobs) {
+  for (const std::string& id : jobs) {
+    const core::Job* job = core::FindJob(turn.state(), id);
+    if (job && core::IsOver(*job)) catalogue_.NoteEnd(id, WallSeconds());
+  }
+}
+
 void Archive::Changed(Turn& turn, const std::set<std::string>& jobs) {
+  NoteEnds(turn, jobs);
   for (const std::string& id : jobs) {
     const core::Job* job = core::FindJob(turn.state(), id);
     const auto known = catalogue_.FindJob(id);
@@ -30,7 +38,7 @@ void Archive::Changed(Turn& turn, const std::set<std::string>& jobs) {
     const auto summary = JobMessage(turn.state(), catalogue_, **known, FrameOutputs::kLeftOut);
     const auto whole = JobMessage(turn.state(), catalogue_, **known, FrameOutputs::kListed);
     if (!summary.ok() || !whole.ok()) continue;
-    turn.Record(store::JobEnded{id, summary->SerializeAsString(), whole->SerializeAsString()});
+    turn.Record(store::JobEnded{id, summary->SerializeAsString(), whole->SerializeAsString(), (*known)->ended_at});
     spdlog::info("job ended: job={} state={}", id, v1::State_Name(whole->state()));
     kept_.push_back({id, job->tasks.size()});
     kept_tasks_ += job->tasks.size();

@@ -18,6 +18,8 @@ class Archive {
  public:
   explicit Archive(Catalogue& catalogue) : catalogue_(catalogue) {}
 
+  /// Called every turn, before whoever shows jobs: notes when they ended.
+  void NoteEnds(const Turn& turn, const std::set<std::string>& jobs);
   /// Called every turn, after whoever shows jobs.
   void Changed(Turn& turn, const std::set<std::string>& jobs);
 

@@ -101,6 +101,15 @@ absl::Status Catalogue::NeedFrames(CatalogueSequence& sequence) const {
   return absl::OkStatus();
 }
 
+core::JobSubmitted Catalogue::Submission(const CatalogueJob& job) const {
+  return {.id = job.added.id,
+          .name = sequences_.at(job.added.sequence).opened.name,
+          .user = job.added.user,
+          .priority = job.added.priority,
+          .terms = job.added.terms,
+          .paused = job.paused};
+}
+
 absl::Status Catalogue::Restore(Turn& turn, store::Snapshot snapshot) {
   turn.Apply(core::Restored{.runs = std::move(snapshot.runs), .attempt_next = snapshot.attempt_next});
   for (store::StoredSequence& stored : snapshot.sequences) {
@@ -120,16 +129,14 @@ absl::Status Catalogue::Restore(Turn& turn, store::Snapshot snapshot) {
     if (sequence == sequences_.end())
       return absl::DataLossError(fmt::format("job {} belongs to sequence {}, which is not on record", id, stored.added.sequence));
     CatalogueJob& job = jobs_[id];
-    job = {.added = std::move(stored.added), .ended = stored.ended};
+    job = {.added = std::move(stored.added), .ended = stored.ended, .paused = stored.paused, .ended_at = stored.ended_at};
     job_order_.push_back(id);
     sequence->second.jobs.push_back(id);
     if (job.ended) continue;
-    turn.Apply(core::JobSubmitted{.id = id,
-                                  .name = sequence->second.opened.name,
-                                  .user = job.added.user,
-                                  .priority = job.added.priority,
-                                  .cancelled = stored.cancelled,
-                                  .failures = std::move(stored.failures)});
+    core::JobSubmitted submitted = Submission(job);
+    submitted.cancelled = stored.cancelled;
+    submitted.failures = std::move(stored.failures);
+    turn.Apply(std::move(submitted));
     Plan(job);
   }
   return absl::OkStatus();
@@ -209,17 +216,23 @@ absl::StatusOr<const CatalogueSequence*> Catalogue::Close(Turn& turn, const std:
 }
 
 absl::StatusOr<std::string> Catalogue::Submit(Turn& turn, const std::string& sequence_id, const std::string& user, std::int32_t priority,
-                                              plan::JobSpec spec) {
+                                              plan::JobSpec spec, const core::JobTerms& terms) {
   const auto found = sequences_.find(sequence_id);
   if (found == sequences_.end()) return FindSequence(sequence_id).status();
   RETURN_IF_ERROR(NeedFrames(found->second));
   const std::string id = fmt::format("j{}", jobs_.size() + 1);
   CatalogueJob& job = jobs_[id];
-  job.added = {.id = id, .sequence = sequence_id, .user = user, .priority = priority, .spec_json = plan::ToJson(spec).dump()};
+  job.added = {.id = id,
+               .sequence = sequence_id,
+               .user = user,
+               .priority = priority,
+               .spec_json = plan::ToJson(spec).dump(),
+               .terms = terms,
+               .submitted = WallSeconds()};
   job_order_.push_back(id);
   found->second.jobs.push_back(id);
   turn.Record(job.added);
-  turn.Apply(core::JobSubmitted{.id = id, .name = found->second.opened.name, .user = user, .priority = priority});
+  turn.Apply(Submission(job));
   Plan(job);
   return id;
 }
@@ -227,20 +240,29 @@ absl::StatusOr<std::string> Catalogue::Submit(Turn& turn, const std::string& seq
 absl::Status Catalogue::Retry(Turn& turn, const std::string& id) {
   RETURN_IF_ERROR(FindJob(id).status());
   CatalogueJob& job = jobs_.at(id);
+  const CatalogueJob before = job;
   job.ended = false;
+  job.ended_at = 0;
   if (core::FindJob(turn.state(), id)) {
     turn.Apply(core::RetryJob{id});
     return absl::OkStatus();
   }
   CatalogueSequence& sequence = sequences_.at(job.added.sequence);
   if (const absl::Status status = NeedFrames(sequence); !status.ok()) {
-    job.ended = true;
+    job = before;
     return status;
   }
   turn.Record(core::Record(core::JobRetried{id}));
-  turn.Apply(core::JobSubmitted{.id = id, .name = sequence.opened.name, .user = job.added.user, .priority = job.added.priority, .verify = true});
+  core::JobSubmitted submitted = Submission(job);
+  submitted.verify = true;
+  turn.Apply(std::move(submitted));
   Plan(job);
   return absl::OkStatus();
+}
+
+void Catalogue::NoteEnd(const std::string& id, double at) {
+  const auto found = jobs_.find(id);
+  if (found != jobs_.end() && found->second.ended_at == 0) found->second.ended_at = at;
 }
 
 void Catalogue::End(const std::string& id) {

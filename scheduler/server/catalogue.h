@@ -25,6 +25,8 @@ struct CatalogueSequence {
 struct CatalogueJob {
   store::JobAdded added;
   bool ended = false;  // on record; the core may have forgotten it
+  bool paused = false;
+  double ended_at = 0;  // seconds since 1970; 0: not yet, or not noted
 };
 
 /// The sequences and jobs that there are, and what follows for the core from each change of them. Touched only inside turns.
@@ -44,8 +46,11 @@ class Catalogue {
   absl::StatusOr<const CatalogueSequence*> Add(Turn& turn, const std::string& sequence, std::vector<store::FrameAdded> frames);
   absl::StatusOr<const CatalogueSequence*> Close(Turn& turn, const std::string& sequence);
   /// Returns the job's id.
-  absl::StatusOr<std::string> Submit(Turn& turn, const std::string& sequence, const std::string& user, std::int32_t priority, plan::JobSpec spec);
+  absl::StatusOr<std::string> Submit(Turn& turn, const std::string& sequence, const std::string& user, std::int32_t priority, plan::JobSpec spec,
+                                     const core::JobTerms& terms = {});
   absl::Status Retry(Turn& turn, const std::string& job);
+  /// Notes when the job ended, in seconds since 1970, unless that is known.
+  void NoteEnd(const std::string& job, double at);
   /// Notes that the job has ended and is on record.
   void End(const std::string& job);
 
@@ -59,6 +64,8 @@ class Catalogue {
   absl::StatusOr<std::string> EndedText(const std::string& job, store::JobText which) const { return store_.FindJobText(job, which); }
 
  private:
+  /// As the core is told of it.
+  core::JobSubmitted Submission(const CatalogueJob& job) const;
   /// A job's tasks on their way to the core.
   struct Planning {
     std::string job;

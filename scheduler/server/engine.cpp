@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include "absl/time/clock.h"
 #include "scheduler/core/step.h"
 #include "services/base/check.h"
 #include "services/base/status.h"
@@ -38,6 +39,8 @@ absl::Time MonotonicNow() {
   const auto since = std::chrono::steady_clock::now().time_since_epoch();
   return absl::UnixEpoch() + absl::FromChrono(since);
 }
+
+double WallSeconds() { return absl::ToDoubleSeconds(absl::Now() - absl::UnixEpoch()); }
 
 void Turn::Apply(core::Event event) {
   core::Effects effects = core::Step(state_, std::move(event), now_);

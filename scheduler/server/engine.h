@@ -106,7 +106,9 @@ class Engine {
   std::thread thread_;
 };
 
-/// Never jumps: what deadlines are measured with.
+/// Never jumps: what leases are measured with.
 absl::Time MonotonicNow();
+/// What people's clocks say, in seconds since 1970.
+double WallSeconds();
 
 }  // namespace vorocast::server

@@ -27,19 +27,30 @@ v1::State StateOf(core::Phase phase) {
   VOROCAST_CHECK(false && "unknown phase");
 }
 
+/// What is known of it without the core.
+void FillTerms(const CatalogueSequence& sequence, const CatalogueJob& job, v1::Job& message) {
+  message.set_session(sequence.opened.session);
+  message.set_paused(job.paused);
+  message.set_priority(job.added.priority);
+  message.set_workers_max(job.added.terms.workers_max);
+  message.set_deadline(job.added.terms.deadline);
+  message.set_submitted(job.added.submitted);
+}
+
 }  // namespace
 
 absl::StatusOr<v1::Job> JobMessage(const core::State& state, const Catalogue& catalogue, const CatalogueJob& job, FrameOutputs frames) {
+  const auto sequence = catalogue.FindSequence(job.added.sequence);
+  VOROCAST_CHECK(sequence.ok());
   const core::Job* known = core::FindJob(state, job.added.id);
   if (!known) {
     v1::Job ended;
     ASSIGN_OR_RETURN(const std::string bytes,
                      catalogue.EndedText(job.added.id, frames == FrameOutputs::kListed ? store::JobText::kWhole : store::JobText::kSummary));
     if (!ended.ParseFromString(bytes)) return absl::DataLossError(fmt::format("the record of job {} cannot be read", job.added.id));
+    FillTerms(**sequence, job, ended);
     return ended;
   }
-  const auto sequence = catalogue.FindSequence(job.added.sequence);
-  VOROCAST_CHECK(sequence.ok());
   const core::JobView view = core::View(state, *known);
 
   v1::Job message;
@@ -50,6 +61,9 @@ absl::StatusOr<v1::Job> JobMessage(const core::State& state, const Catalogue& ca
   message.set_user(job.added.user);
   message.set_state(StateOf(view.phase));
   message.set_seconds_left(view.seconds_left);
+  FillTerms(**sequence, job, message);
+  // Until it is on record, it ended just now.
+  if (HasEnded(message.state())) message.set_ended(job.ended_at > 0 ? job.ended_at : WallSeconds());
   for (const core::StageView& seen : view.stages) {
     v1::Stage& stage = *message.add_stages();
     stage.set_kind(std::string(tasks::Name(seen.kind)));

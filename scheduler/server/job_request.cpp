@@ -24,6 +24,25 @@ absl::Status CheckRange(std::int32_t value, std::int32_t low, std::int32_t high,
   return absl::InvalidArgumentError(fmt::format("{} is {}; it must be from {} to {}", field, value, low, high));
 }
 
+constexpr std::int32_t kWorkersMax = 1'000'000;
+constexpr std::int64_t kMemoryMin = std::int64_t{64} << 20;
+constexpr std::int64_t kMemoryMax = std::int64_t{4} << 40;
+constexpr double kTimeFactorMin = 0.1;
+constexpr double kTimeFactorMax = 100;
+/// The year 9999: nobody means more, and no clock arithmetic overflows before.
+constexpr double kDeadlineMax = 253'402'300'799.0;
+
+absl::Status CheckMemory(std::int64_t bytes) {
+  if (bytes == 0 || (bytes >= kMemoryMin && bytes <= kMemoryMax)) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      fmt::format("memory_limit is {} bytes; it must be from {} MiB to {} TiB", bytes, kMemoryMin >> 20, kMemoryMax >> 40));
+}
+
+absl::Status CheckTimeFactor(double factor) {
+  if (factor == 0 || (factor >= kTimeFactorMin && factor <= kTimeFactorMax)) return absl::OkStatus();
+  return absl::InvalidArgumentError(fmt::format("time_factor is {}; it must be from {} to {}", factor, kTimeFactorMin, kTimeFactorMax));
+}
+
 /// They would reach other people's terminals and the log.
 bool HasControlCharacters(const std::string& text) {
   return std::ranges::any_of(text, [](unsigned char c) { return c < 0x20 || c == 0x7f; });
@@ -94,6 +113,26 @@ absl::StatusOr<plan::JobSpec> SpecOf(const v1::SubmitJobRequest& request) {
   tasks::TessellateOptions checked;
   RETURN_IF_ERROR(tasks::FromJson(tasks::ToJson(spec.tessellate), checked));
   return spec;
+}
+
+absl::StatusOr<core::JobTerms> TermsOf(const v1::SubmitJobRequest& request) {
+  RETURN_IF_ERROR(CheckRange(request.workers_max(), 0, kWorkersMax, "workers_max"));
+  RETURN_IF_ERROR(CheckMemory(request.memory_limit()));
+  RETURN_IF_ERROR(CheckTimeFactor(request.time_factor()));
+  if (!(request.deadline() >= 0 && request.deadline() <= kDeadlineMax))
+    return absl::InvalidArgumentError(fmt::format("deadline is {}; it must be seconds since 1970", request.deadline()));
+  return core::JobTerms{.workers_max = request.workers_max(),
+                        .deadline = request.deadline(),
+                        .memory_limit = request.memory_limit(),
+                        .time_factor = request.time_factor() == 0 ? 1 : request.time_factor()};
+}
+
+absl::Status SetLimits(const v1::RetryJobRequest& request, core::JobTerms& terms) {
+  RETURN_IF_ERROR(CheckMemory(request.memory_limit()));
+  RETURN_IF_ERROR(CheckTimeFactor(request.time_factor()));
+  if (request.memory_limit() != 0) terms.memory_limit = request.memory_limit();
+  if (request.time_factor() != 0) terms.time_factor = request.time_factor();
+  return absl::OkStatus();
 }
 
 void SetCapture(const store::SequenceOpened& sequence, plan::JobSpec& spec) {

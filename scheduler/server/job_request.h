@@ -12,6 +12,11 @@ namespace vorocast::server {
 /// INVALID_ARGUMENT names the field and what it may hold.
 absl::StatusOr<plan::JobSpec> SpecOf(const v1::SubmitJobRequest& request);
 
+/// When and how far it may run. The same errors.
+absl::StatusOr<core::JobTerms> TermsOf(const v1::SubmitJobRequest& request);
+/// Of the limits of a retry: those that are 0 stay as they are in `terms`.
+absl::Status SetLimits(const v1::RetryJobRequest& request, core::JobTerms& terms);
+
 /// The capture's units, axis and rate.
 void SetCapture(const store::SequenceOpened& sequence, plan::JobSpec& spec);
 

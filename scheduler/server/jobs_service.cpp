@@ -38,15 +38,19 @@ absl::StatusOr<JobsService::OutputFile> JobsService::FindOutput(Turn& turn, cons
 grpc::ServerUnaryReactor* JobsService::Submit(grpc::CallbackServerContext* context, const v1::SubmitJobRequest* request, v1::Job* reply) {
   auto spec = SpecOf(*request);
   if (!spec.ok()) return Answer(context, spec.status());
-  return AnswerInTurn<v1::Job>(context, engine_, reply, [this, request, asked = *std::move(spec)](Turn& turn, v1::Job& job) -> absl::Status {
-    plan::JobSpec whole = asked;
-    ASSIGN_OR_RETURN(const CatalogueSequence* sequence, catalogue_.FindSequence(request->sequence_id()));
-    SetCapture(sequence->opened, whole);
-    ASSIGN_OR_RETURN(const std::string id, catalogue_.Submit(turn, request->sequence_id(), request->user(), request->priority(), std::move(whole)));
-    spdlog::info("job submitted: job={} sequence={} take=\"{}\" user=\"{}\" priority={}", id, request->sequence_id(), sequence->opened.name,
-                 request->user(), request->priority());
-    return Show(turn, id, job);
-  });
+  const auto terms = TermsOf(*request);
+  if (!terms.ok()) return Answer(context, terms.status());
+  return AnswerInTurn<v1::Job>(
+      context, engine_, reply, [this, request, asked = *std::move(spec), terms = *terms](Turn& turn, v1::Job& job) -> absl::Status {
+        plan::JobSpec whole = asked;
+        ASSIGN_OR_RETURN(const CatalogueSequence* sequence, catalogue_.FindSequence(request->sequence_id()));
+        SetCapture(sequence->opened, whole);
+        ASSIGN_OR_RETURN(const std::string id,
+                         catalogue_.Submit(turn, request->sequence_id(), request->user(), request->priority(), std::move(whole), terms));
+        spdlog::info("job submitted: job={} sequence={} take=\"{}\" user=\"{}\" priority={}", id, request->sequence_id(), sequence->opened.name,
+                     request->user(), request->priority());
+        return Show(turn, id, job);
+      });
 }
 
 grpc::ServerUnaryReactor* JobsService::Get(grpc::CallbackServerContext* context, const v1::JobRequest* request, v1::Job* reply) {
@@ -56,14 +60,17 @@ grpc::ServerUnaryReactor* JobsService::Get(grpc::CallbackServerContext* context,
 grpc::ServerUnaryReactor* JobsService::List(grpc::CallbackServerContext* context, const v1::ListJobsRequest* request, v1::ListJobsReply* reply) {
   const std::int32_t limit = request->limit() == 0 ? kListed : request->limit();
   if (limit < 0 || limit > kListedMax) return Answer(context, absl::InvalidArgumentError(fmt::format("limit must be from 0 to {}", kListedMax)));
-  return AnswerInTurn<v1::ListJobsReply>(context, engine_, reply, [this, limit](Turn& turn, v1::ListJobsReply& list) -> absl::Status {
-    const auto& order = catalogue_.job_order();
-    for (auto id = order.rbegin(); id != order.rend() && list.jobs_size() < limit; ++id) {
-      ASSIGN_OR_RETURN(const CatalogueJob* job, catalogue_.FindJob(*id));
-      ASSIGN_OR_RETURN(*list.add_jobs(), JobMessage(turn.state(), catalogue_, *job, FrameOutputs::kLeftOut));
-    }
-    return absl::OkStatus();
-  });
+  return AnswerInTurn<v1::ListJobsReply>(context, engine_, reply,
+                                         [this, limit, session = request->session()](Turn& turn, v1::ListJobsReply& list) -> absl::Status {
+                                           const auto& order = catalogue_.job_order();
+                                           for (auto id = order.rbegin(); id != order.rend() && list.jobs_size() < limit; ++id) {
+                                             ASSIGN_OR_RETURN(const CatalogueJob* job, catalogue_.FindJob(*id));
+                                             ASSIGN_OR_RETURN(const CatalogueSequence* sequence, catalogue_.FindSequence(job->added.sequence));
+                                             if (!session.empty() && sequence->opened.session != session) continue;
+                                             ASSIGN_OR_RETURN(*list.add_jobs(), JobMessage(turn.state(), catalogue_, *job, FrameOutputs::kLeftOut));
+                                           }
+                                           return absl::OkStatus();
+                                         });
 }
 
 grpc::ServerWriteReactor<v1::Job>* JobsService::Watch(grpc::CallbackServerContext*, const v1::JobRequest* request) {

@@ -80,6 +80,7 @@ void SchedulerServer::Parts::StartEngine() {
                 .changed =
                     [this](Turn& turn, const std::set<std::string>& changed) {
                       if (catalogue.PlanSome(turn)) engine.Enqueue([](Turn&) {});
+                      archive.NoteEnds(turn, changed);
                       watchers.Changed(turn, changed);
                       archive.Changed(turn, changed);
                     },

@@ -69,23 +69,45 @@ void PostgresBatch::AddCaptures(std::vector<PostgresStatement>& statements) cons
 }
 
 void PostgresBatch::AddJobs(std::vector<PostgresStatement>& statements) const {
-  PostgresArray id, sequence, user, priority, spec;
+  PostgresArray id, sequence, user, priority, spec, submitted, workers_max, deadline, memory_limit, time_factor;
   for (const JobAdded* job : jobs_) {
     id.Add(job->id);
     sequence.Add(job->sequence);
     user.Add(job->user);
     priority.Add(std::int64_t{job->priority});
     spec.Add(job->spec_json);
+    submitted.Add(job->submitted);
+    workers_max.Add(std::int64_t{job->terms.workers_max});
+    deadline.Add(job->terms.deadline);
+    memory_limit.Add(job->terms.memory_limit);
+    time_factor.Add(job->terms.time_factor);
   }
-  AddStatement(statements,
-               "INSERT INTO job(id, sequence, user_name, priority, spec) SELECT id, sequence, user_name, priority, spec FROM "
-               "unnest($1::text[], $2::text[], $3::text[], $4::int[], $5::text[]) WITH ORDINALITY AS t(id, sequence, user_name, priority, spec, n) "
-               "ORDER BY n ON CONFLICT (id) DO NOTHING",
-               id, sequence, user, priority, spec);
+  AddStatement(
+      statements,
+      "INSERT INTO job(id, sequence, user_name, priority, spec, submitted, workers_max, deadline, memory_limit, time_factor) "
+      "SELECT id, sequence, user_name, priority, spec, submitted, workers_max, deadline, memory_limit, time_factor FROM "
+      "unnest($1::text[], $2::text[], $3::text[], $4::int[], $5::text[], $6::float8[], $7::int[], $8::float8[], $9::bigint[], $10::float8[]) "
+      "WITH ORDINALITY AS t(id, sequence, user_name, priority, spec, submitted, workers_max, deadline, memory_limit, time_factor, n) "
+      "ORDER BY n ON CONFLICT (id) DO NOTHING",
+      id, sequence, user, priority, spec, submitted, workers_max, deadline, memory_limit, time_factor);
   PostgresArray cancelled, going_on, retried;
   for (const auto& [job, is_cancelled] : cancelled_) (is_cancelled ? cancelled : going_on).Add(job);
   AddStatement(statements, "UPDATE job SET cancelled = true WHERE id = ANY($1::text[])", cancelled);
   AddStatement(statements, "UPDATE job SET cancelled = false WHERE id = ANY($1::text[])", going_on);
+  PostgresArray paused, resumed;
+  for (const auto& [job, is_paused] : paused_) (is_paused ? paused : resumed).Add(job);
+  AddStatement(statements, "UPDATE job SET paused = true WHERE id = ANY($1::text[])", paused);
+  AddStatement(statements, "UPDATE job SET paused = false WHERE id = ANY($1::text[])", resumed);
+  PostgresArray limited, new_memory_limit, new_time_factor;
+  for (const auto& [job, limits] : limited_) {
+    limited.Add(job);
+    new_memory_limit.Add(limits->memory_limit);
+    new_time_factor.Add(limits->time_factor);
+  }
+  AddStatement(statements,
+               "UPDATE job SET memory_limit = t.memory_limit, time_factor = t.time_factor FROM "
+               "unnest($1::text[], $2::bigint[], $3::float8[]) AS t(id, memory_limit, time_factor) WHERE job.id = t.id",
+               limited, new_memory_limit, new_time_factor);
   for (const std::string& job : retried_) retried.Add(job);
   PostgresArray retried_again = retried;
   AddStatement(statements, "DELETE FROM failure WHERE job = ANY($1::text[])", retried);
@@ -101,16 +123,17 @@ void PostgresBatch::AddJobs(std::vector<PostgresStatement>& statements) const {
                "INSERT INTO failure SELECT * FROM unnest($1::text[], $2::text[], $3::int[], $4::text[]) "
                "ON CONFLICT (job, task) DO UPDATE SET cause = excluded.cause, message = excluded.message",
                of_job, task, cause, message);
-  PostgresArray ended, summary, whole;
+  PostgresArray ended, summary, whole, ended_at;
   for (const auto& [job, end] : ended_) {
     ended.Add(job);
     summary.AddBytes(end->summary);
     whole.AddBytes(end->whole);
+    ended_at.Add(end->ended);
   }
   AddStatement(statements,
-               "INSERT INTO ended_job SELECT * FROM unnest($1::text[], $2::bytea[], $3::bytea[]) "
-               "ON CONFLICT (job) DO UPDATE SET summary = excluded.summary, whole = excluded.whole",
-               ended, summary, whole);
+               "INSERT INTO ended_job(job, summary, whole, ended) SELECT * FROM unnest($1::text[], $2::bytea[], $3::bytea[], $4::float8[]) "
+               "ON CONFLICT (job) DO UPDATE SET summary = excluded.summary, whole = excluded.whole, ended = excluded.ended",
+               ended, summary, whole, ended_at);
 }
 
 void PostgresBatch::AddRuns(std::vector<PostgresStatement>& statements) const {
@@ -130,7 +153,7 @@ void PostgresBatch::AddRuns(std::vector<PostgresStatement>& statements) const {
       "ON CONFLICT (key) DO UPDATE SET sha256 = excluded.sha256, size = excluded.size, seconds = excluded.seconds, "
       "cpu_seconds = excluded.cpu_seconds, memory_peak = excluded.memory_peak, made_for = excluded.made_for",
       made, sha256, size, seconds, cpu_seconds, memory_peak, made_for);
-  PostgresArray key, attempt, worker, failed, interrupted, memory_raised, ended;
+  PostgresArray key, attempt, worker, failed, interrupted, memory_raised, time_raised, copy_attempt, copy_worker, ended;
   for (const auto& [run, saved] : runs_) {
     if (!saved) {
       ended.Add(run);
@@ -142,12 +165,17 @@ void PostgresBatch::AddRuns(std::vector<PostgresStatement>& statements) const {
     failed.Add(std::int64_t{saved->tries.failed});
     interrupted.Add(std::int64_t{saved->tries.interrupted});
     memory_raised.Add(std::int64_t{saved->tries.memory_raised});
+    time_raised.Add(std::int64_t{saved->tries.time_raised});
+    copy_attempt.Add(saved->copy_attempt);
+    copy_worker.Add(saved->copy_worker);
   }
   AddStatement(statements,
-               "INSERT INTO run SELECT * FROM unnest($1::bytea[], $2::bigint[], $3::text[], $4::int[], $5::int[], $6::int[]) "
+               "INSERT INTO run(key, attempt, worker, failed, interrupted, memory_raised, time_raised, copy_attempt, copy_worker) SELECT * FROM "
+               "unnest($1::bytea[], $2::bigint[], $3::text[], $4::int[], $5::int[], $6::int[], $7::int[], $8::bigint[], $9::text[]) "
                "ON CONFLICT (key) DO UPDATE SET attempt = excluded.attempt, worker = excluded.worker, failed = excluded.failed, "
-               "interrupted = excluded.interrupted, memory_raised = excluded.memory_raised",
-               key, attempt, worker, failed, interrupted, memory_raised);
+               "interrupted = excluded.interrupted, memory_raised = excluded.memory_raised, time_raised = excluded.time_raised, "
+               "copy_attempt = excluded.copy_attempt, copy_worker = excluded.copy_worker",
+               key, attempt, worker, failed, interrupted, memory_raised, time_raised, copy_attempt, copy_worker);
   AddStatement(statements, "DELETE FROM run WHERE key = ANY($1::bytea[])", ended);
   if (attempt_next_) {
     statements.push_back({"INSERT INTO counter VALUES('attempt_next', $1) ON CONFLICT (name) DO UPDATE SET value = excluded.value",

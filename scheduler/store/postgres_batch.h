@@ -33,6 +33,8 @@ class PostgresBatch {
   void operator()(const core::AttemptsReserved& record) { attempt_next_ = record.next; }
   void operator()(const core::JobCancelled& record) { cancelled_[record.job] = true; }
   void operator()(const core::JobRetried& record);
+  void operator()(const core::JobPaused& record) { paused_[record.job] = record.paused; }
+  void operator()(const core::JobLimited& record) { limited_[record.job] = &record; }
 
  private:
   void AddCaptures(std::vector<PostgresStatement>& statements) const;
@@ -46,6 +48,8 @@ class PostgresBatch {
   std::vector<const JobAdded*> jobs_;
   std::map<std::string, const JobEnded*> ended_;
   std::map<std::string, bool> cancelled_;
+  std::map<std::string, bool> paused_;
+  std::map<std::string, const core::JobLimited*> limited_;
   std::set<std::string> retried_;  // whose older failures and end go first
   std::map<std::pair<std::string, std::string>, const core::TaskFailed*> failures_;
   std::map<base::Digest, const core::Result*> results_;

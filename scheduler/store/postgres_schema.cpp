@@ -37,6 +37,15 @@ CREATE TABLE result(key bytea PRIMARY KEY, sha256 bytea NOT NULL, size bigint NO
 CREATE TABLE run(key bytea PRIMARY KEY, attempt bigint NOT NULL, worker text NOT NULL, failed integer NOT NULL, interrupted integer NOT NULL,
   memory_raised integer NOT NULL);
 )"},
+    // When jobs came and ended, on what terms they run; a second attempt at a task that takes long.
+    {2, R"(
+ALTER TABLE job ADD COLUMN submitted double precision NOT NULL DEFAULT 0, ADD COLUMN paused boolean NOT NULL DEFAULT false,
+  ADD COLUMN workers_max integer NOT NULL DEFAULT 0, ADD COLUMN deadline double precision NOT NULL DEFAULT 0,
+  ADD COLUMN memory_limit bigint NOT NULL DEFAULT 0, ADD COLUMN time_factor double precision NOT NULL DEFAULT 1;
+ALTER TABLE ended_job ADD COLUMN ended double precision NOT NULL DEFAULT 0;
+ALTER TABLE run ADD COLUMN time_raised integer NOT NULL DEFAULT 0, ADD COLUMN copy_attempt bigint NOT NULL DEFAULT 0,
+  ADD COLUMN copy_worker text NOT NULL DEFAULT '';
+)"},
 };
 
 }  // namespace

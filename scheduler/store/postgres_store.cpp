@@ -28,10 +28,12 @@ constexpr const char* kFramesInUse =
     "SELECT sequence FROM job WHERE id NOT IN (SELECT job FROM ended_job)) ORDER BY sequence COLLATE \"C\", number";
 constexpr const char* kFramesOfOne = "SELECT sequence, number, encode(blob, 'hex'), extension, size FROM frame WHERE sequence = $1 ORDER BY number";
 constexpr const char* kJobs =
-    "SELECT id, sequence, user_name, priority, spec, cancelled, id IN (SELECT job FROM ended_job) FROM job ORDER BY position";
+    "SELECT id, sequence, user_name, priority, spec, cancelled, ended_job.job IS NOT NULL, submitted, paused, workers_max, deadline, memory_limit, "
+    "time_factor, coalesce(ended_job.ended, 0) FROM job LEFT JOIN ended_job ON ended_job.job = job.id ORDER BY position";
 constexpr const char* kFailures =
     "SELECT job, task, cause, message FROM failure WHERE job NOT IN (SELECT job FROM ended_job) ORDER BY job COLLATE \"C\", task COLLATE \"C\"";
-constexpr const char* kRuns = "SELECT encode(key, 'hex'), attempt, worker, failed, interrupted, memory_raised FROM run ORDER BY key";
+constexpr const char* kRuns =
+    "SELECT encode(key, 'hex'), attempt, worker, failed, interrupted, memory_raised, time_raised, copy_attempt, copy_worker FROM run ORDER BY key";
 constexpr const char* kResult =
     "SELECT encode(sha256, 'hex'), size, seconds, cpu_seconds, memory_peak, made_for FROM result WHERE key = decode($1, 'hex')";
 
@@ -67,7 +69,10 @@ class PostgresStore final : public Store {
                                .worker = runs.Text(row, 2),
                                .tries = {.failed = static_cast<std::int32_t>(runs.Integer(row, 3)),
                                          .interrupted = static_cast<std::int32_t>(runs.Integer(row, 4)),
-                                         .memory_raised = static_cast<std::int32_t>(runs.Integer(row, 5))}});
+                                         .memory_raised = static_cast<std::int32_t>(runs.Integer(row, 5)),
+                                         .time_raised = static_cast<std::int32_t>(runs.Integer(row, 6))},
+                               .copy_attempt = runs.Integer(row, 7),
+                               .copy_worker = runs.Text(row, 8)});
     }
     ASSIGN_OR_RETURN(const PostgresRows counter, writing_.Ask({"SELECT value FROM counter WHERE name = 'attempt_next'", {}}));
     if (counter.size() > 0) snapshot.attempt_next = counter.Integer(0, 0);
@@ -155,9 +160,16 @@ class PostgresStore final : public Store {
                                          .sequence = jobs.Text(row, 1),
                                          .user = jobs.Text(row, 2),
                                          .priority = static_cast<std::int32_t>(jobs.Integer(row, 3)),
-                                         .spec_json = jobs.Text(row, 4)},
+                                         .spec_json = jobs.Text(row, 4),
+                                         .terms = {.workers_max = static_cast<std::int32_t>(jobs.Integer(row, 9)),
+                                                   .deadline = jobs.Number(row, 10),
+                                                   .memory_limit = jobs.Integer(row, 11),
+                                                   .time_factor = jobs.Number(row, 12)},
+                                         .submitted = jobs.Number(row, 7)},
                                .cancelled = jobs.Truth(row, 5),
-                               .ended = jobs.Truth(row, 6)});
+                               .paused = jobs.Truth(row, 8),
+                               .ended = jobs.Truth(row, 6),
+                               .ended_at = jobs.Number(row, 13)});
     }
     ASSIGN_OR_RETURN(const PostgresRows failures, writing_.Ask({kFailures, {}}));
     for (int row = 0; row < failures.size(); ++row) {

@@ -31,6 +31,19 @@ CREATE TABLE run(key BLOB PRIMARY KEY, attempt INTEGER NOT NULL, worker TEXT NOT
 CREATE TABLE ended_job(job TEXT PRIMARY KEY, summary BLOB NOT NULL, whole BLOB NOT NULL);
 INSERT INTO meta VALUES('term', 0);
 )"},
+    // When jobs came and ended, on what terms they run; a second attempt at a task that takes long.
+    {3, R"(
+ALTER TABLE job ADD COLUMN submitted REAL NOT NULL DEFAULT 0;
+ALTER TABLE job ADD COLUMN paused INTEGER NOT NULL DEFAULT 0;
+ALTER TABLE job ADD COLUMN workers_max INTEGER NOT NULL DEFAULT 0;
+ALTER TABLE job ADD COLUMN deadline REAL NOT NULL DEFAULT 0;
+ALTER TABLE job ADD COLUMN memory_limit INTEGER NOT NULL DEFAULT 0;
+ALTER TABLE job ADD COLUMN time_factor REAL NOT NULL DEFAULT 1;
+ALTER TABLE ended_job ADD COLUMN ended REAL NOT NULL DEFAULT 0;
+ALTER TABLE run ADD COLUMN time_raised INTEGER NOT NULL DEFAULT 0;
+ALTER TABLE run ADD COLUMN copy_attempt INTEGER NOT NULL DEFAULT 0;
+ALTER TABLE run ADD COLUMN copy_worker TEXT NOT NULL DEFAULT '';
+)"},
 };
 
 absl::StatusOr<std::int64_t> AskInteger(SqliteConnection& connection, std::string_view sql) {

@@ -30,11 +30,14 @@ class RecordWriter {
   }
   absl::Status operator()(const SequenceClosed& r) { return Write("UPDATE sequence SET closed = 1 WHERE id = ?", r.sequence); }
   absl::Status operator()(const JobAdded& r) {
-    return Write("INSERT OR IGNORE INTO job(id, sequence, user, priority, spec) VALUES(?,?,?,?,?)", r.id, r.sequence, r.user, r.priority,
-                 r.spec_json);
+    return Write(
+        "INSERT OR IGNORE INTO job(id, sequence, user, priority, spec, submitted, workers_max, deadline, memory_limit, time_factor) "
+        "VALUES(?,?,?,?,?,?,?,?,?,?)",
+        r.id, r.sequence, r.user, r.priority, r.spec_json, r.submitted, r.terms.workers_max, r.terms.deadline, r.terms.memory_limit,
+        r.terms.time_factor);
   }
   absl::Status operator()(const JobEnded& r) {
-    return Write("INSERT OR REPLACE INTO ended_job VALUES(?,?,?)", r.job, Bytes{r.summary}, Bytes{r.whole});
+    return Write("INSERT OR REPLACE INTO ended_job(job, summary, whole, ended) VALUES(?,?,?,?)", r.job, Bytes{r.summary}, Bytes{r.whole}, r.ended);
   }
   absl::Status operator()(const core::Record& record) { return std::visit(*this, record); }
   absl::Status operator()(const core::ResultMade& r) {
@@ -45,8 +48,10 @@ class RecordWriter {
     return Write("INSERT OR REPLACE INTO failure VALUES(?,?,?,?)", r.job, r.task, static_cast<std::int32_t>(r.cause), r.message);
   }
   absl::Status operator()(const core::RunSaved& r) {
-    return Write("INSERT OR REPLACE INTO run VALUES(?,?,?,?,?,?)", r.key, r.attempt, r.worker, r.tries.failed, r.tries.interrupted,
-                 r.tries.memory_raised);
+    return Write(
+        "INSERT OR REPLACE INTO run(key, attempt, worker, failed, interrupted, memory_raised, time_raised, copy_attempt, copy_worker) "
+        "VALUES(?,?,?,?,?,?,?,?,?)",
+        r.key, r.attempt, r.worker, r.tries.failed, r.tries.interrupted, r.tries.memory_raised, r.tries.time_raised, r.copy_attempt, r.copy_worker);
   }
   absl::Status operator()(const core::RunEnded& r) { return Write("DELETE FROM run WHERE key = ?", r.key); }
   absl::Status operator()(const core::AttemptsReserved& r) { return Write("INSERT OR REPLACE INTO meta VALUES('attempt_next', ?)", r.next); }
@@ -55,6 +60,12 @@ class RecordWriter {
     RETURN_IF_ERROR(Write("UPDATE job SET cancelled = 0 WHERE id = ?", r.job));
     RETURN_IF_ERROR(Write("DELETE FROM ended_job WHERE job = ?", r.job));
     return Write("DELETE FROM failure WHERE job = ?", r.job);
+  }
+  absl::Status operator()(const core::JobPaused& r) {
+    return Write("UPDATE job SET paused = ? WHERE id = ?", static_cast<std::int32_t>(r.paused), r.job);
+  }
+  absl::Status operator()(const core::JobLimited& r) {
+    return Write("UPDATE job SET memory_limit = ?, time_factor = ? WHERE id = ?", r.memory_limit, r.time_factor, r.job);
   }
 
  private:
@@ -107,10 +118,12 @@ constexpr std::string_view kFramesInUse =
     "SELECT sequence FROM job WHERE id NOT IN (SELECT job FROM ended_job)) ORDER BY sequence, number";
 constexpr std::string_view kFramesOfOne = "SELECT sequence, number, blob, extension, size FROM frame WHERE sequence = ? ORDER BY number";
 constexpr std::string_view kJobs =
-    "SELECT id, sequence, user, priority, spec, cancelled, id IN (SELECT job FROM ended_job) FROM job ORDER BY position";
+    "SELECT id, sequence, user, priority, spec, cancelled, ended_job.job IS NOT NULL, submitted, paused, workers_max, deadline, memory_limit, "
+    "time_factor, coalesce(ended_job.ended, 0) FROM job LEFT JOIN ended_job ON ended_job.job = job.id ORDER BY position";
 constexpr std::string_view kFailures =
     "SELECT job, task, cause, message FROM failure WHERE job NOT IN (SELECT job FROM ended_job) ORDER BY job, task";
-constexpr std::string_view kRuns = "SELECT key, attempt, worker, failed, interrupted, memory_raised FROM run ORDER BY key";
+constexpr std::string_view kRuns =
+    "SELECT key, attempt, worker, failed, interrupted, memory_raised, time_raised, copy_attempt, copy_worker FROM run ORDER BY key";
 constexpr std::string_view kResult = "SELECT sha256, size, seconds, cpu_seconds, memory_peak, made_for FROM result WHERE key = ?";
 
 FrameAdded FrameOf(const SqliteStatement& row) {
@@ -157,7 +170,10 @@ class SqliteStore final : public Store {
                                .worker = row.Text(2),
                                .tries = {.failed = static_cast<std::int32_t>(row.Integer(3)),
                                          .interrupted = static_cast<std::int32_t>(row.Integer(4)),
-                                         .memory_raised = static_cast<std::int32_t>(row.Integer(5))}});
+                                         .memory_raised = static_cast<std::int32_t>(row.Integer(5)),
+                                         .time_raised = static_cast<std::int32_t>(row.Integer(6))},
+                               .copy_attempt = row.Integer(7),
+                               .copy_worker = row.Text(8)});
       return absl::OkStatus();
     }));
     RETURN_IF_ERROR(ForEachRow(writing_, "SELECT value FROM meta WHERE name = 'attempt_next'", [&](const SqliteStatement& row) {
@@ -284,9 +300,16 @@ class SqliteStore final : public Store {
                                          .sequence = row.Text(1),
                                          .user = row.Text(2),
                                          .priority = static_cast<std::int32_t>(row.Integer(3)),
-                                         .spec_json = row.Text(4)},
+                                         .spec_json = row.Text(4),
+                                         .terms = {.workers_max = static_cast<std::int32_t>(row.Integer(9)),
+                                                   .deadline = row.Number(10),
+                                                   .memory_limit = row.Integer(11),
+                                                   .time_factor = row.Number(12)},
+                                         .submitted = row.Number(7)},
                                .cancelled = row.Integer(5) != 0,
-                               .ended = row.Integer(6) != 0});
+                               .paused = row.Integer(8) != 0,
+                               .ended = row.Integer(6) != 0,
+                               .ended_at = row.Number(13)});
       return absl::OkStatus();
     }));
     return ForEachRow(writing_, kFailures, [&](const SqliteStatement& row) -> absl::Status {

@@ -38,6 +38,8 @@ struct JobAdded {
   std::string user;
   std::int32_t priority = 0;
   std::string spec_json;  // plan::JobSpec
+  core::JobTerms terms{};
+  double submitted = 0;  // seconds since 1970; 0: recorded by a version that did not note it
 };
 
 /// A job that has come to its end, as it is shown from then on without being planned again. core::JobRetried forgets it.
@@ -45,6 +47,7 @@ struct JobEnded {
   std::string job;
   std::string summary;  // v1::Job without the frames' own outputs
   std::string whole;    // v1::Job with all of them
+  double ended = 0;     // seconds since 1970
 };
 
 using Record = std::variant<SequenceOpened, FrameAdded, SequenceClosed, JobAdded, JobEnded, core::Record>;
@@ -57,9 +60,11 @@ struct StoredSequence {
   std::optional<std::vector<FrameAdded>> frames;
 };
 struct StoredJob {
-  JobAdded added;
+  JobAdded added;  // its limits as they are now
   bool cancelled = false;
+  bool paused = false;
   bool ended = false;
+  double ended_at = 0;                     // seconds since 1970; 0: not yet, or not noted
   std::vector<core::TaskFailed> failures;  // by task name; none for an ended job
 };
 /// What a scheduler needs to go on: everything but results and ended jobs, which are looked up when somebody asks.

@@ -25,6 +25,11 @@ struct Writer {
     Job(retried.job).cancelled = false;
     Job(retried.job).failures.clear();
   }
+  void operator()(const core::JobPaused& paused) const { Job(paused.job).paused = paused.paused; }
+  void operator()(const core::JobLimited& limited) const {
+    Job(limited.job).terms.memory_limit = limited.memory_limit;
+    Job(limited.job).terms.time_factor = limited.time_factor;
+  }
 };
 
 }  // namespace
@@ -39,12 +44,13 @@ std::string SimulatedStore::Text() const {
   std::string text = fmt::format("term {} attempts {}\n", term, attempt_next);
   const auto add = std::back_inserter(text);
   for (const SubmittedJob& job : jobs) {
-    fmt::format_to(add, "{} {}\n", job.id, job.cancelled);
+    fmt::format_to(add, "{} {} {} {} {}\n", job.id, job.cancelled, job.paused, job.terms.memory_limit, job.terms.time_factor);
     for (const auto& [task, failure] : job.failures) fmt::format_to(add, "{} {} {}\n", task, core::Name(failure.cause), failure.message);
   }
   for (const auto& [key, result] : results) fmt::format_to(add, "{} {} {}\n", key.Hex(), result.sha256.Hex(), result.made_for);
   for (const auto& [key, run] : runs) {
-    fmt::format_to(add, "{} {} {} {} {} {}\n", key.Hex(), run.attempt, run.worker, run.tries.failed, run.tries.interrupted, run.tries.memory_raised);
+    fmt::format_to(add, "{} {} {} {} {} {} {} {} {}\n", key.Hex(), run.attempt, run.worker, run.tries.failed, run.tries.interrupted,
+                   run.tries.memory_raised, run.tries.time_raised, run.copy_attempt, run.copy_worker);
   }
   return text;
 }

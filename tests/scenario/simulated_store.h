@@ -20,7 +20,9 @@ struct SimulatedStore {
     std::string user;
     std::int32_t priority = 0;
     plan::JobSpec spec;
+    core::JobTerms terms{};
     bool cancelled = false;
+    bool paused = false;
     std::map<std::string, core::TaskFailed> failures;
   };
   std::int64_t term = 0;

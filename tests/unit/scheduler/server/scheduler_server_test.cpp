@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -205,6 +206,39 @@ TEST_F(SchedulerServerTest, RunsAJobToItsEnd) {
   for (const auto& [label, times] : worker_->executed()) EXPECT_EQ(times, 1) << label;
 }
 
+TEST_F(SchedulerServerTest, AJobSaysOnWhatTermsItRunsAndWhenItCameAndEnded) {
+  StartWorker();
+  const auto sequence = Open();
+  const double before = absl::ToDoubleSeconds(absl::Now() - absl::UnixEpoch());
+  const auto job = Submit(sequence->id(), [](v1::SubmitJobRequest& request) {
+    request.set_priority(3);
+    request.set_workers_max(2);
+    request.set_deadline(4e9);
+  });
+  ASSERT_TRUE(job.ok()) << job.status();
+  EXPECT_EQ(job->session(), sequence->session());
+  EXPECT_EQ(job->priority(), 3);
+  EXPECT_EQ(job->workers_max(), 2);
+  EXPECT_EQ(job->deadline(), 4e9);
+  EXPECT_GE(job->submitted(), before);
+  EXPECT_EQ(job->ended(), 0);
+  ASSERT_TRUE(AddFrames(sequence->id(), 0, 4).ok());
+  ASSERT_TRUE(Close(sequence->id()).ok());
+  ASSERT_EQ(WatchToEnd(job->id())->state(), v1::DONE);
+  server_.reset();
+  StartScheduler();
+  const auto ended = Get(job->id());
+  EXPECT_EQ(ended->workers_max(), 2);
+  EXPECT_EQ(ended->session(), sequence->session());
+  EXPECT_EQ(ended->submitted(), job->submitted());
+  EXPECT_GE(ended->ended(), ended->submitted());
+  v1::ListJobsRequest request;
+  request.set_session(sequence->session());
+  EXPECT_EQ((Call<v1::Jobs::StubInterface>(*jobs_, &v1::Jobs::StubInterface::List, request)->jobs_size()), 1);
+  request.set_session("another day");
+  EXPECT_EQ((Call<v1::Jobs::StubInterface>(*jobs_, &v1::Jobs::StubInterface::List, request)->jobs_size()), 0);
+}
+
 TEST_F(SchedulerServerTest, ABadFrameCostsThatFrame) {
   StartWorker({.fails = [](const std::string& label) { return label == "frame 2: tessellate" ? "3 normals are not finite" : ""; }});
   const auto sequence = Open();
@@ -346,6 +380,11 @@ TEST_F(SchedulerServerTest, RefusesWhatIsWrong) {
   EXPECT_THAT(std::string(Submit(sequence->id(), [](auto& r) { r.set_cells(-5); }).status().message()), HasSubstr("cells"));
   EXPECT_THAT(std::string(Submit(sequence->id(), [](auto& r) { r.set_indicator("magic"); }).status().message()), HasSubstr("spectral"));
   EXPECT_THAT(std::string(Submit(sequence->id(), [](auto& r) { r.set_effect_json("{"); }).status().message()), HasSubstr("effect_json"));
+  EXPECT_THAT(std::string(Submit(sequence->id(), [](auto& r) { r.set_workers_max(-1); }).status().message()), HasSubstr("workers_max"));
+  EXPECT_THAT(std::string(Submit(sequence->id(), [](auto& r) { r.set_memory_limit(1000); }).status().message()), HasSubstr("memory_limit"));
+  EXPECT_THAT(std::string(Submit(sequence->id(), [](auto& r) { r.set_time_factor(NAN); }).status().message()), HasSubstr("time_factor"));
+  EXPECT_THAT(std::string(Submit(sequence->id(), [](auto& r) { r.set_time_factor(1e9); }).status().message()), HasSubstr("time_factor"));
+  EXPECT_THAT(std::string(Submit(sequence->id(), [](auto& r) { r.set_deadline(NAN); }).status().message()), HasSubstr("deadline"));
   EXPECT_EQ(Get("j99").status().code(), absl::StatusCode::kNotFound);
 
   v1::Blob blob = BlobOf(1);

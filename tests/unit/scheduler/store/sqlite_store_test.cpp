@@ -64,8 +64,16 @@ TEST_F(SqliteStoreTest, TakesOverADatabaseFromBeforeTerms) {
   Lead()->Append(Take()).IgnoreError();
   auto connection = SqliteConnection::Open(path_);
   ASSERT_TRUE(connection->Execute("DROP TABLE ended_job; DROP TABLE migration; DELETE FROM meta WHERE name = 'term'; PRAGMA user_version = 1").ok());
+  for (const char* column : {"submitted", "paused", "workers_max", "deadline", "memory_limit", "time_factor"}) {
+    ASSERT_TRUE(connection->Execute(fmt::format("ALTER TABLE job DROP COLUMN {}", column)).ok());
+  }
+  for (const char* column : {"time_raised", "copy_attempt", "copy_worker"}) {
+    ASSERT_TRUE(connection->Execute(fmt::format("ALTER TABLE run DROP COLUMN {}", column)).ok());
+  }
   const auto store = Lead();
-  EXPECT_EQ(store->Load()->jobs.size(), 1u);
+  ASSERT_EQ(store->Load()->jobs.size(), 1u);
+  EXPECT_EQ(store->Load()->jobs[0].added.submitted, 0);
+  EXPECT_EQ(store->Load()->jobs[0].added.terms.time_factor, 1);
   EXPECT_TRUE(store->Append({core::Record(core::JobCancelled{"j1"})}).ok());
 }
 

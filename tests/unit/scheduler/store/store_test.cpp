@@ -107,9 +107,16 @@ std::vector<Record> Take() {
           FrameAdded{"s1", 7, base::HashBytes("seven"), ".ply", 70},
           FrameAdded{"s1", 2, base::HashBytes("two"), ".drc", 20},
           SequenceClosed{"s1"},
-          JobAdded{"j1", "s1", "anna, \"the\" user", -3, R"({"cells":5})"},
+          JobAdded{"j1",
+                   "s1",
+                   "anna, \"the\" user",
+                   -3,
+                   R"({"cells":5})",
+                   {.workers_max = 7, .deadline = 1.8e9 + 0.25, .memory_limit = 9'000'000'000, .time_factor = 1.75},
+                   1.7e9 + 0.5},
           core::Record(core::TaskFailed{"j1", "frame 2: tessellate", core::Cause::kTimedOut, "too long, {\"by\"} \\far"}),
-          core::Record(core::RunSaved{base::HashBytes("run"), 12, "worker-1", {.failed = 1, .interrupted = 2, .memory_raised = 1}}),
+          core::Record(core::RunSaved{
+              base::HashBytes("run"), 12, "worker-1", {.failed = 1, .interrupted = 2, .memory_raised = 1, .time_raised = 3}, 19, "worker \"2\""}),
           core::Record(core::AttemptsReserved{1001}),
           core::Record(core::ResultMade{base::HashBytes("key"), {base::HashBytes("bytes"), 99, 1.5, 0.1, 4096, "j1"}})};
 }
@@ -133,8 +140,15 @@ void ExpectTake(Store& store) {
   EXPECT_EQ(snapshot->jobs[0].added.priority, -3);
   EXPECT_EQ(snapshot->jobs[0].added.user, "anna, \"the\" user");
   EXPECT_EQ(snapshot->jobs[0].added.spec_json, R"({"cells":5})");
+  EXPECT_EQ(snapshot->jobs[0].added.terms.workers_max, 7);
+  EXPECT_EQ(snapshot->jobs[0].added.terms.deadline, 1.8e9 + 0.25);
+  EXPECT_EQ(snapshot->jobs[0].added.terms.memory_limit, 9'000'000'000);
+  EXPECT_EQ(snapshot->jobs[0].added.terms.time_factor, 1.75);
+  EXPECT_EQ(snapshot->jobs[0].added.submitted, 1.7e9 + 0.5);
   EXPECT_FALSE(snapshot->jobs[0].cancelled);
+  EXPECT_FALSE(snapshot->jobs[0].paused);
   EXPECT_FALSE(snapshot->jobs[0].ended);
+  EXPECT_EQ(snapshot->jobs[0].ended_at, 0);
   ASSERT_EQ(snapshot->jobs[0].failures.size(), 1u);
   EXPECT_EQ(snapshot->jobs[0].failures[0].cause, core::Cause::kTimedOut);
   EXPECT_EQ(snapshot->jobs[0].failures[0].message, "too long, {\"by\"} \\far");
@@ -143,6 +157,10 @@ void ExpectTake(Store& store) {
   EXPECT_EQ(snapshot->runs[0].worker, "worker-1");
   EXPECT_EQ(snapshot->runs[0].attempt, 12);
   EXPECT_EQ(snapshot->runs[0].tries.interrupted, 2);
+  EXPECT_EQ(snapshot->runs[0].tries.memory_raised, 1);
+  EXPECT_EQ(snapshot->runs[0].tries.time_raised, 3);
+  EXPECT_EQ(snapshot->runs[0].copy_attempt, 19);
+  EXPECT_EQ(snapshot->runs[0].copy_worker, "worker \"2\"");
   EXPECT_EQ(snapshot->attempt_next, 1001);
   const auto result = store.FindResult(base::HashBytes("key"));
   ASSERT_TRUE(result.ok() && result->has_value()) << result.status();
@@ -200,6 +218,29 @@ TEST_P(StoreTest, WithinOneBatchTooTheLastRecordHolds) {
   EXPECT_EQ(snapshot->attempt_next, 2001);
 }
 
+TEST_P(StoreTest, APauseAndNewLimitsLastOverAReopening) {
+  {
+    const auto store = Lead();
+    ASSERT_TRUE(store->Append(Take()).ok());
+    // Within one batch too the last one holds.
+    const absl::Status status =
+        store->Append({core::Record(core::JobPaused{"j1", false}), core::Record(core::JobPaused{"j1", true}),
+                       core::Record(core::JobLimited{"j1", 1, 1}), core::Record(core::JobLimited{"j1", 12'000'000'000, 2.5})});
+    ASSERT_TRUE(status.ok()) << status;
+  }
+  const auto store = Lead();
+  const auto snapshot = store->Load();
+  EXPECT_TRUE(snapshot->jobs[0].paused);
+  EXPECT_EQ(snapshot->jobs[0].added.terms.memory_limit, 12'000'000'000);
+  EXPECT_EQ(snapshot->jobs[0].added.terms.time_factor, 2.5);
+  EXPECT_EQ(snapshot->jobs[0].added.terms.workers_max, 7);
+  ASSERT_TRUE(store->Append({core::Record(core::JobRetried{"j1"})}).ok());
+  EXPECT_TRUE(store->Load()->jobs[0].paused) << "a retry resumes nothing";
+  EXPECT_EQ(store->Load()->jobs[0].added.terms.time_factor, 2.5);
+  ASSERT_TRUE(store->Append({core::Record(core::JobPaused{"j1", false})}).ok());
+  EXPECT_FALSE(store->Load()->jobs[0].paused);
+}
+
 TEST_P(StoreTest, KeepsTheOrderOfSubmission) {
   const auto store = Lead();
   std::vector<Record> records;
@@ -220,11 +261,12 @@ TEST_P(StoreTest, AnEndedJobIsKeptAsItWasShown) {
   const std::string whole("bytes\0with \"all\" \xff of them", 25);
   ASSERT_TRUE(store->Append(Take()).ok());
   EXPECT_EQ(store->FindJobText("j1", JobText::kWhole).status().code(), absl::StatusCode::kNotFound);
-  ASSERT_TRUE(store->Append({JobEnded{"j1", "short", whole}}).ok());
+  ASSERT_TRUE(store->Append({JobEnded{"j1", "short", whole, 1.7e9 + 99.5}}).ok());
   EXPECT_EQ(*store->FindJobText("j1", JobText::kSummary), "short");
   EXPECT_EQ(*store->FindJobText("j1", JobText::kWhole), whole);
   const auto snapshot = store->Load();
   EXPECT_TRUE(snapshot->jobs[0].ended);
+  EXPECT_EQ(snapshot->jobs[0].ended_at, 1.7e9 + 99.5);
   EXPECT_TRUE(snapshot->jobs[0].failures.empty());
   // Nobody needs the frames for planning any more.
   EXPECT_FALSE(snapshot->sequences[0].frames.has_value());
@@ -233,6 +275,7 @@ TEST_P(StoreTest, AnEndedJobIsKeptAsItWasShown) {
   EXPECT_EQ(store->LoadFrames("s1")->at(0).blob, base::HashBytes("two"));
   ASSERT_TRUE(store->Append({core::Record(core::JobRetried{"j1"})}).ok());
   EXPECT_FALSE(store->Load()->jobs[0].ended);
+  EXPECT_EQ(store->Load()->jobs[0].ended_at, 0);
   EXPECT_TRUE(store->Load()->sequences[0].frames.has_value());
 }
 
