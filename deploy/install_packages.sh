@@ -13,7 +13,7 @@ packages=(
   # storage and state
   libhdf5-dev libsqlite3-dev libpq-dev libssl-dev
   # everyday libraries
-  libspdlog-dev libfmt-dev libcli11-dev nlohmann-json3-dev
+  libspdlog-dev libfmt-dev libcli11-dev nlohmann-json3-dev prometheus-cpp-dev
   # peers that benchmarks measure beside
   voro++-dev libceres-dev
   # tests, benchmarks, checks

@@ -81,11 +81,16 @@ struct Succeeded {
 struct AttemptFailed {
   Cause cause = Cause::kInternal;
   std::string message;
+  // As far as they were measured.
+  double seconds = 0;
+  double cpu_seconds = 0;
+  std::int64_t memory_peak = 0;  // bytes
 };
 struct Finished {
   ConnectionId connection = 0;
   AttemptId id;
   std::variant<Succeeded, AttemptFailed> outcome;
+  std::string log;  // the end of what the attempt printed
 };
 struct Tick {};
 struct CancelJob {

@@ -24,7 +24,7 @@ void Transition::On(Restored& event) {
     const auto index = static_cast<RunIndex>(state_.runs.size());
     state_.runs.push_back({.key = saved.key, .tries = saved.tries, .saved = true});
     state_.run_by_key.emplace(saved.key, index);
-    SetRun(index, Leased{.attempt = saved.attempt, .worker = worker, .deadline = now_ + state_.settings.lease});
+    SetRun(index, Leased{.attempt = saved.attempt, .worker = worker, .deadline = now_ + state_.settings.lease, .started = now_});
   }
 }
 

@@ -69,7 +69,7 @@ void Transition::LeaseTo(RunIndex index, WorkerIndex worker_index) {
     state_.attempt_reserved = attempt + kAttemptBlock;
     effects_.records.push_back(AttemptsReserved{state_.attempt_reserved});
   }
-  SetRun(index, Leased{.attempt = attempt, .worker = worker_index, .deadline = now_ + state_.settings.lease});
+  SetRun(index, Leased{.attempt = attempt, .worker = worker_index, .deadline = now_ + state_.settings.lease, .started = now_});
   Run& run = state_.runs[index];
   run.saved = true;
   Save(run);

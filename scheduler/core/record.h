@@ -5,8 +5,10 @@
 #include <string>
 #include <variant>
 
+#include "absl/time/time.h"
 #include "scheduler/core/cause.h"
 #include "services/base/digest.h"
+#include "services/tasks/task.h"
 
 /// What the core wants kept over a restart. Every record may be written twice without harm.
 namespace vorocast::core {
@@ -74,6 +76,26 @@ struct JobTerms {
   double time_factor = 1;         // the usual time limits times this
 };
 
-using Record = std::variant<ResultMade, TaskFailed, RunSaved, RunEnded, AttemptsReserved, JobCancelled, JobRetried, JobPaused, JobLimited>;
+/// What became of one attempt at a task; of an attempt that several jobs waited for, one for each of their tasks. Nothing is decided by it:
+/// it is kept for those who ask afterwards.
+struct AttemptEnded {
+  enum class Outcome : std::uint8_t { kDone, kFailed, kCancelled };
+  std::string job;
+  std::string task;  // its name in the plan
+  tasks::Kind kind = tasks::Kind::kTessellate;
+  std::int64_t attempt = 0;
+  std::string worker;
+  absl::Duration lasted;
+  absl::Time ended = absl::UnixEpoch();  // by the wall clock, which the core does not have: whoever puts it on record says
+  Outcome outcome = Outcome::kDone;
+  Cause cause = Cause::kInternal;  // of a failure, like `message`
+  std::string message;
+  double cpu_seconds = 0;        // this and what follows as the worker told; 0 and empty if it did not come to that
+  std::int64_t memory_peak = 0;  // bytes
+  std::string log;               // the end of what it printed
+};
+
+using Record = std::variant<ResultMade, TaskFailed, RunSaved, RunEnded, AttemptsReserved, JobCancelled, JobRetried, JobPaused, JobLimited,
+                            AttemptEnded>;
 
 }  // namespace vorocast::core

@@ -107,8 +107,25 @@ void Transition::Save(const Run& run) {
   effects_.records.push_back(std::move(saved));
 }
 
-void Transition::EndAttempt(RunIndex index, Cause cause, const std::string& message) {
+void Transition::RecordAttempt(const Run& run, const Task& task, AttemptEnded ended) {
+  const auto& leased = std::get<Leased>(run.state);
+  ended.job = state_.jobs[task.job].id;
+  ended.task = task.name;
+  ended.kind = task.kind;
+  ended.attempt = leased.attempt;
+  ended.worker = state_.workers[leased.worker].name;
+  // One that began under an earlier scheduler is older than this one knows.
+  ended.lasted = std::max(ended.lasted, now_ - leased.started);
+  effects_.records.emplace_back(std::move(ended));
+}
+
+void Transition::EndAttempt(RunIndex index, Cause cause, const std::string& message, const AttemptEnded& told) {
   Run& run = state_.runs[index];
+  AttemptEnded ended = told;
+  ended.outcome = AttemptEnded::Outcome::kFailed;
+  ended.cause = cause;
+  ended.message = message;
+  for (const TaskIndex task : run.tasks) RecordAttempt(run, state_.tasks[task], ended);
   const Verdict verdict = Judge(cause, run.tries);
   if (run.tasks.empty()) return Abandon(index);
   if (verdict.again) {
@@ -152,9 +169,19 @@ void Transition::On(Finished& event) {
   if (const WorkerIndex worker = WorkerOf(event.connection); worker != kNone) Hear(worker);
   const RunIndex index = FindAttempt(event.id);
   if (index == kNone) return;
-  if (const auto* failed = std::get_if<AttemptFailed>(&event.outcome)) return EndAttempt(index, failed->cause, failed->message);
+  AttemptEnded ended{.log = std::move(event.log)};
+  if (const auto* failed = std::get_if<AttemptFailed>(&event.outcome)) {
+    ended.lasted = absl::Seconds(failed->seconds);
+    ended.cpu_seconds = failed->cpu_seconds;
+    ended.memory_peak = failed->memory_peak;
+    return EndAttempt(index, failed->cause, failed->message, ended);
+  }
   Result& result = std::get<Succeeded>(event.outcome).result;
   const Run& run = state_.runs[index];
+  ended.lasted = absl::Seconds(result.seconds);
+  ended.cpu_seconds = result.cpu_seconds;
+  ended.memory_peak = result.memory_peak;
+  for (const TaskIndex task : run.tasks) RecordAttempt(run, state_.tasks[task], ended);
   if (!run.tasks.empty()) result.made_for = state_.jobs[state_.tasks[First(run)].job].id;
   effects_.records.push_back(ResultMade{event.id.key, result});
   EndRun(index, [&](const Task& task) { return Done{event.id.key, result, result.made_for != state_.jobs[task.job].id}; });

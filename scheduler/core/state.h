@@ -81,6 +81,7 @@ struct Leased {
   std::int64_t attempt = 0;
   WorkerIndex worker = kNone;
   absl::Time deadline;
+  absl::Time started;
   double fraction = 0;
 };
 using RunState = std::variant<LookingUp, Ready, Resting, Leased>;

@@ -75,6 +75,8 @@ void Transition::Leave(TaskIndex index, TaskState next) {
   const auto* wanted = std::get_if<Wanted>(&state_.tasks[index].state);
   if (!wanted) return SetTask(index, std::move(next));
   const RunIndex run_index = wanted->run;
+  const Run& run = state_.runs[run_index];
+  if (std::holds_alternative<Leased>(run.state)) RecordAttempt(run, state_.tasks[index], {.outcome = AttemptEnded::Outcome::kCancelled});
   SetTask(index, std::move(next));
   Unlist(run_index);
   std::erase(state_.runs[run_index].tasks, index);

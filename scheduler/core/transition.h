@@ -64,7 +64,10 @@ class Transition {
   void List(RunIndex run);
   void Unlist(RunIndex run);
   void EndRun(RunIndex run, const std::function<TaskState(const Task&)>& outcome);
-  void EndAttempt(RunIndex run, Cause cause, const std::string& message);
+  /// `told`: what the worker said about its end, if that is how it is known.
+  void EndAttempt(RunIndex run, Cause cause, const std::string& message, const AttemptEnded& told = {});
+  /// Puts the end of a leased run's attempt on record for one of its tasks.
+  void RecordAttempt(const Run& run, const Task& task, AttemptEnded ended);
   /// Nobody wants its result any more.
   void Abandon(RunIndex run);
   void Save(const Run& run);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "scheduler/server/archive.h"
 
+#include <algorithm>
+
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
@@ -18,6 +20,32 @@ absl::StatusOr<v1::Job> Read(const Catalogue& catalogue, const std::string& job)
   v1::Job message;
   if (!message.ParseFromString(bytes)) return absl::DataLossError(fmt::format("the record of job {} cannot be read", job));
   return message;
+}
+
+/// What the attempts at a task of an ended job tell about it.
+absl::StatusOr<std::string> ExplainByAttempts(const Catalogue& catalogue, const std::string& job, const std::string& task, const std::string& state) {
+  ASSIGN_OR_RETURN(const std::vector<core::AttemptEnded> attempts, catalogue.FindAttempts({.job = job, .task = task}));
+  if (attempts.empty()) {
+    return fmt::format(
+        "{} ended a while ago and is {}; no attempt at \"{}\" is on record: its result existed already, it was never started, its record was "
+        "too old to be kept, or the job has no such task.",
+        job, state, task);
+  }
+  const core::AttemptEnded& last = attempts.back();
+  const auto failed = std::count_if(attempts.begin(), attempts.end(),
+                                    [](const core::AttemptEnded& attempt) { return attempt.outcome == core::AttemptEnded::Outcome::kFailed; });
+  const std::string where = fmt::format("on worker {} after {:.1f} s", last.worker, absl::ToDoubleSeconds(last.lasted));
+  switch (last.outcome) {
+    case core::AttemptEnded::Outcome::kDone:
+      if (failed == 0) return fmt::format("{} is done; it ended {}.", task, where);
+      return fmt::format("{} is done; it ended {}, and {} attempts before it failed.", task, where, failed);
+    case core::AttemptEnded::Outcome::kFailed:
+      return fmt::format("{} did not end: {} of {} attempts failed, the last {}: {}: {}.", task, failed, attempts.size(), where,
+                         core::Name(last.cause), last.message);
+    case core::AttemptEnded::Outcome::kCancelled:
+      break;
+  }
+  return fmt::format("{} was cancelled {}.", task, where);
 }
 
 }  // namespace
@@ -74,7 +102,7 @@ absl::StatusOr<std::string> ExplainEnded(const Catalogue& catalogue, const std::
     if (meant) return fmt::format("{} failed: {}: {}.", job, failure.label(), failure.cause());
   }
   if (task.empty()) return fmt::format("{} is {}.", job, state);
-  return fmt::format("{} ended a while ago and is {}; of its tasks only the failures are kept, and \"{}\" is none of them.", job, state, task);
+  return ExplainByAttempts(catalogue, job, task, state);
 }
 
 }  // namespace vorocast::server

@@ -37,7 +37,7 @@ class Archive {
 
 /// One of an ended job's outputs, by name. NOT_FOUND if it has none of that name.
 absl::StatusOr<v1::Output> FindEndedOutput(const Catalogue& catalogue, const std::string& job, const std::string& name);
-/// Why the job, or one of its tasks, ended as it did, as far as the record says.
+/// Why the job, or one of its tasks (by label), ended as it did, as far as the record says. From any thread: it reads the store.
 absl::StatusOr<std::string> ExplainEnded(const Catalogue& catalogue, const std::string& job, const std::string& task);
 
 }  // namespace vorocast::server

@@ -279,6 +279,19 @@ absl::StatusOr<const CatalogueSequence*> Catalogue::FindSequence(const std::stri
   return &found->second;
 }
 
+absl::StatusOr<store::FrameAdded> Catalogue::FindFrame(const CatalogueSequence& sequence, std::int32_t number) const {
+  const auto missing = absl::NotFoundError(fmt::format("take \"{}\" has no frame {}", sequence.opened.name, number));
+  if (sequence.frames) {
+    const auto found = sequence.frames->find(number);
+    return found == sequence.frames->end() ? absl::StatusOr<store::FrameAdded>(missing) : found->second;
+  }
+  ASSIGN_OR_RETURN(const std::vector<store::FrameAdded> frames, store_.LoadFrames(sequence.opened.id));
+  for (const store::FrameAdded& frame : frames) {
+    if (frame.number == number) return frame;
+  }
+  return missing;
+}
+
 absl::StatusOr<const CatalogueJob*> Catalogue::FindJob(const std::string& id) const {
   const auto found = jobs_.find(id);
   if (found == jobs_.end()) return absl::NotFoundError(fmt::format("there is no job \"{}\"; 'vorocast status' names those there are", id));

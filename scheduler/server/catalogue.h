@@ -60,6 +60,12 @@ class Catalogue {
   /// Ids, in the order they were submitted.
   const std::vector<std::string>& job_order() const { return job_order_; }
 
+  /// A captured frame of a sequence. NOT_FOUND names it.
+  absl::StatusOr<store::FrameAdded> FindFrame(const CatalogueSequence& sequence, std::int32_t number) const;
+
+  // Of what is on record, from any thread.
+
+  absl::StatusOr<std::vector<core::AttemptEnded>> FindAttempts(const store::AttemptQuery& query) const { return store_.FindAttempts(query); }
   /// v1::Job, in bytes, of an ended job.
   absl::StatusOr<std::string> EndedText(const std::string& job, store::JobText which) const { return store_.FindJobText(job, which); }
 

@@ -45,6 +45,7 @@ double WallSeconds() { return absl::ToDoubleSeconds(absl::Now() - absl::UnixEpoc
 void Turn::Apply(core::Event event) {
   core::Effects effects = core::Step(state_, std::move(event), now_);
   for (core::Record& record : effects.records) {
+    if (auto* ended = std::get_if<core::AttemptEnded>(&record)) ended->ended = absl::Now();
     Log(record);
     records_.emplace_back(std::move(record));
   }

@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "scheduler/server/jobs_service.h"
 
+#include <charconv>
+#include <string_view>
+
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include "scheduler/core/job_view.h"
 #include "scheduler/server/archive.h"
+#include "scheduler/server/attempts_call.h"
 #include "scheduler/server/job_message.h"
 #include "scheduler/server/job_request.h"
 #include "scheduler/server/unary_call.h"
@@ -15,6 +19,21 @@ namespace {
 
 constexpr std::int32_t kListed = 50;
 constexpr std::int32_t kListedMax = 10'000;
+constexpr std::string_view kCapture = "capture/";
+
+/// "capture/frame_000412.ply" is frame 412, if that came as PLY.
+absl::StatusOr<store::FrameAdded> FindCapturedFrame(const Catalogue& catalogue, const CatalogueSequence& sequence, const std::string& name) {
+  constexpr std::string_view kFrame = "capture/frame_";
+  const auto unknown = absl::NotFoundError(fmt::format("there is no \"{}\"; a captured frame is named like capture/frame_000412.ply", name));
+  if (!name.starts_with(kFrame)) return unknown;
+  std::int32_t number = 0;
+  const char* const end = name.data() + name.size();
+  const auto [dot, error] = std::from_chars(name.data() + kFrame.size(), end, number);
+  if (error != std::errc() || number < 0) return unknown;
+  ASSIGN_OR_RETURN(const store::FrameAdded frame, catalogue.FindFrame(sequence, number));
+  if (std::string_view(dot, static_cast<std::size_t>(end - dot)) != frame.extension) return unknown;
+  return frame;
+}
 
 }  // namespace
 
@@ -25,7 +44,12 @@ absl::Status JobsService::Show(Turn& turn, const std::string& id, v1::Job& reply
 }
 
 absl::StatusOr<JobsService::OutputFile> JobsService::FindOutput(Turn& turn, const std::string& id, const std::string& name) const {
-  RETURN_IF_ERROR(catalogue_.FindJob(id).status());
+  ASSIGN_OR_RETURN(const CatalogueJob* known, catalogue_.FindJob(id));
+  if (name.starts_with(kCapture)) {
+    ASSIGN_OR_RETURN(const CatalogueSequence* sequence, catalogue_.FindSequence(known->added.sequence));
+    ASSIGN_OR_RETURN(const store::FrameAdded frame, FindCapturedFrame(catalogue_, *sequence, name));
+    return OutputFile{artifacts_.BlobPath(frame.blob, frame.extension), frame.blob.Hex()};
+  }
   if (const core::Job* job = core::FindJob(turn.state(), id)) {
     ASSIGN_OR_RETURN(const core::OutputView output, core::FindOutput(turn.state(), *job, name));
     return OutputFile{artifacts_.ArtifactPath(output.key, output.extension), output.result.sha256.Hex()};
@@ -85,20 +109,31 @@ grpc::ServerWriteReactor<v1::Job>* JobsService::Watch(grpc::CallbackServerContex
 }
 
 grpc::ServerUnaryReactor* JobsService::Explain(grpc::CallbackServerContext* context, const v1::ExplainRequest* request, v1::ExplainReply* reply) {
-  return AnswerInTurn<v1::ExplainReply>(context, engine_, reply, [this, request](Turn& turn, v1::ExplainReply& explained) -> absl::Status {
-    RETURN_IF_ERROR(catalogue_.FindJob(request->job_id()).status());
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  const absl::Status accepted = engine_.Ask([this, reactor, request, reply](Turn& turn) {
+    const absl::Status known = catalogue_.FindJob(request->job_id()).status();
     const core::Job* job = core::FindJob(turn.state(), request->job_id());
-    if (!job) {
-      ASSIGN_OR_RETURN(*explained.mutable_text(), ExplainEnded(catalogue_, request->job_id(), request->task()));
-      return absl::OkStatus();
+    if (known.ok() && !job) {
+      // From the record, which may take a while to read.
+      return turn.After([this, reactor, request, reply] {
+        disk_.Run([this, reactor, request, reply] {
+          auto text = ExplainEnded(catalogue_, request->job_id(), TaskLabel(request->job_id(), request->task()));
+          if (text.ok()) reply->set_text(*std::move(text));
+          reactor->Finish(rpc::ToGrpc(text.status()));
+        });
+      });
     }
-    if (request->task().empty()) {
-      explained.set_text(core::Explain(turn.state(), *job));
-      return absl::OkStatus();
-    }
-    ASSIGN_OR_RETURN(*explained.mutable_text(), core::Explain(turn.state(), *job, request->task()));
-    return absl::OkStatus();
+    const auto explain = [&]() -> absl::StatusOr<std::string> {
+      RETURN_IF_ERROR(known);
+      if (request->task().empty()) return core::Explain(turn.state(), *job);
+      return core::Explain(turn.state(), *job, request->task());
+    };
+    auto text = explain();
+    if (text.ok()) reply->set_text(*std::move(text));
+    turn.Answer([reactor, status = text.status()](const absl::Status& durable) { reactor->Finish(rpc::ToGrpc(durable.ok() ? status : durable)); });
   });
+  if (!accepted.ok()) reactor->Finish(rpc::ToGrpc(accepted));
+  return reactor;
 }
 
 grpc::ServerUnaryReactor* JobsService::Cancel(grpc::CallbackServerContext* context, const v1::JobRequest* request, v1::Job* reply) {
@@ -121,6 +156,20 @@ grpc::ServerWriteReactor<v1::FetchChunk>* JobsService::Fetch(grpc::CallbackServe
     const auto output = FindOutput(turn, id, name);
     if (!output.ok()) return turn.After([call, status = output.status()] { call->Refuse(status); });
     turn.After([call, path = output->path, sha256 = output->sha256] { call->Send(path, sha256); });
+  });
+  if (!accepted.ok()) call->Refuse(accepted);
+  return call;
+}
+
+grpc::ServerWriteReactor<v1::AttemptsReply>* JobsService::Attempts(grpc::CallbackServerContext*, const v1::AttemptsRequest* request) {
+  auto* call = new AttemptsCall(catalogue_, disk_, *request);
+  const absl::Status accepted = engine_.Ask([this, call, id = request->job_id(), task = request->task()](Turn& turn) {
+    const absl::Status known = catalogue_.FindJob(id).status();
+    if (!known.ok()) return turn.After([call, known] { call->Refuse(known); });
+    std::vector<v1::TaskAttempt> running;
+    if (const core::Job* job = core::FindJob(turn.state(), id)) running = RunningAttempts(turn.state(), *job, TaskLabel(id, task));
+    // After the commit: whatever ended before is on record then.
+    turn.After([call, running = std::move(running)]() mutable { call->Send(std::move(running)); });
   });
   if (!accepted.ok()) call->Refuse(accepted);
   return call;

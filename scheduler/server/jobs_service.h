@@ -29,6 +29,7 @@ class JobsService final : public v1::Jobs::CallbackService {
   grpc::ServerUnaryReactor* Cancel(grpc::CallbackServerContext* context, const v1::JobRequest* request, v1::Job* reply) override;
   grpc::ServerUnaryReactor* Retry(grpc::CallbackServerContext* context, const v1::RetryJobRequest* request, v1::Job* reply) override;
   grpc::ServerWriteReactor<v1::FetchChunk>* Fetch(grpc::CallbackServerContext* context, const v1::FetchRequest* request) override;
+  grpc::ServerWriteReactor<v1::AttemptsReply>* Attempts(grpc::CallbackServerContext* context, const v1::AttemptsRequest* request) override;
 
  private:
   struct OutputFile {

@@ -10,8 +10,6 @@
 #include <string>
 
 #include <fmt/format.h>
-#include <spdlog/sinks/basic_file_sink.h>
-#include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
@@ -21,6 +19,7 @@
 #include "scheduler/server/standby.h"
 #include "scheduler/store/postgres_store.h"
 #include "services/base/processor.h"
+#include "services/telemetry/telemetry_flags.h"
 
 namespace vorocast::server {
 namespace {
@@ -30,6 +29,7 @@ struct Options {
   std::string database;
   std::string listen;
   fleet::FleetFlags fleet;
+  telemetry::TelemetryFlags telemetry;
 };
 
 constexpr std::size_t kUnixPathMax = 107;
@@ -60,26 +60,9 @@ absl::Status Announce(const std::filesystem::path& state, const std::string& add
   return absl::OkStatus();
 }
 
-absl::Status StartLog(const std::filesystem::path& state) {
-  std::error_code error;
-  std::filesystem::create_directories(state / "logs", error);
-  if (error) return absl::UnavailableError(fmt::format("{}: cannot be created: {}", (state / "logs").string(), error.message()));
-  try {
-    auto file = std::make_shared<spdlog::sinks::basic_file_sink_mt>((state / "logs" / "scheduler.log").string());
-    auto terminal = std::make_shared<spdlog::sinks::stderr_sink_mt>();
-    auto logger = std::make_shared<spdlog::logger>("scheduler", spdlog::sinks_init_list{file, terminal});
-    logger->set_pattern("%Y-%m-%dT%H:%M:%S.%e%z %l %v");
-    logger->flush_on(spdlog::level::info);
-    spdlog::set_default_logger(std::move(logger));
-  } catch (const spdlog::spdlog_ex& problem) {
-    return absl::UnavailableError(problem.what());
-  }
-  return absl::OkStatus();
-}
-
 absl::Status Serve(const Options& options, const sigset_t& stop_signals) {
   const std::filesystem::path state = std::filesystem::absolute(options.state).lexically_normal();
-  RETURN_IF_ERROR(StartLog(state));
+  RETURN_IF_ERROR(options.telemetry.StartLog("scheduler", state / "logs" / "scheduler.log"));
   const std::string listen = options.listen.empty() ? StableAddress(state) : options.listen;
   std::unique_ptr<SchedulerServer> server;
   if (options.database.empty()) {
@@ -128,6 +111,7 @@ int Main(int argc, char** argv) {
                  "folder: one leads, the others stand by. The password comes from ~/.pgpass or PGPASSWORD");
   app.add_option("--listen", options.listen, "HOST:PORT or unix:/path (default: a socket in the state folder)");
   options.fleet.AddTo(app);
+  options.telemetry.AddTo(app);
   CLI11_PARSE(app, argc, argv);
 
   absl::Status status = Validate(options);

@@ -14,6 +14,8 @@ namespace {
 constexpr std::size_t kWorkerNameMax = 200;
 constexpr std::int32_t kSlotsMax = 4096;
 constexpr std::size_t kFailureMessageMax = 4000;
+/// A worker keeps the last 64 KiB of what an attempt printed; replaced bytes may make that a little longer.
+constexpr std::size_t kLogBytesMax = 256 << 10;
 
 absl::StatusOr<core::AttemptId> IdOf(const v1::AttemptId& id) {
   ASSIGN_OR_RETURN(const base::Digest key, rpc::ParseDigest(id.task_id(), "task_id"));
@@ -39,6 +41,12 @@ core::Cause CauseOf(v1::Failed::Cause cause) {
   }
 }
 
+/// PostgreSQL's text knows no zero byte.
+std::string WithoutZeros(std::string text) {
+  std::replace(text.begin(), text.end(), '\0', ' ');
+  return text;
+}
+
 double Measured(double value) { return std::isfinite(value) && value > 0 ? value : 0; }
 
 absl::StatusOr<core::Event> EventOf(core::ConnectionId connection, const v1::Hello& hello) {
@@ -46,6 +54,7 @@ absl::StatusOr<core::Event> EventOf(core::ConnectionId connection, const v1::Hel
   if (hello.worker().empty() || hello.worker().size() > kWorkerNameMax) {
     return absl::InvalidArgumentError(fmt::format("hello.worker must have 1 to {} characters", kWorkerNameMax));
   }
+  if (hello.worker().find('\0') != std::string::npos) return absl::InvalidArgumentError("hello.worker must not have a zero byte");
   if (hello.slots() < 1 || hello.slots() > kSlotsMax) return absl::InvalidArgumentError(fmt::format("hello.slots must be from 1 to {}", kSlotsMax));
   for (const std::string& name : hello.kinds()) {
     ASSIGN_OR_RETURN(const tasks::Kind kind, tasks::KindFromName(name));
@@ -69,6 +78,8 @@ absl::StatusOr<core::Event> EventOf(core::ConnectionId connection, const v1::Hea
 
 absl::StatusOr<core::Event> EventOf(core::ConnectionId connection, const v1::Finished& finished) {
   core::Finished ended{.connection = connection};
+  if (finished.log().size() > kLogBytesMax) return absl::InvalidArgumentError(fmt::format("finished.log has more than {} bytes", kLogBytesMax));
+  ended.log = finished.log();
   ASSIGN_OR_RETURN(ended.id, IdOf(finished.id()));
   if (finished.has_succeeded()) {
     const v1::Succeeded& succeeded = finished.succeeded();
@@ -81,7 +92,12 @@ absl::StatusOr<core::Event> EventOf(core::ConnectionId connection, const v1::Fin
     return ended;
   }
   if (!finished.has_failed()) return absl::InvalidArgumentError("finished has no outcome");
-  ended.outcome = core::AttemptFailed{CauseOf(finished.failed().cause()), finished.failed().message().substr(0, kFailureMessageMax)};
+  const v1::Failed& failed = finished.failed();
+  ended.outcome = core::AttemptFailed{.cause = CauseOf(failed.cause()),
+                                      .message = WithoutZeros(failed.message().substr(0, kFailureMessageMax)),
+                                      .seconds = Measured(failed.seconds()),
+                                      .cpu_seconds = Measured(failed.cpu_seconds()),
+                                      .memory_peak = std::max<std::int64_t>(failed.memory_peak(), 0)};
   return ended;
 }
 

@@ -33,6 +33,7 @@ std::vector<PostgresStatement> PostgresBatch::Statements() const {
   AddCaptures(statements);
   AddJobs(statements);
   AddRuns(statements);
+  AddAttempts(statements);
   return statements;
 }
 
@@ -181,6 +182,47 @@ void PostgresBatch::AddRuns(std::vector<PostgresStatement>& statements) const {
     statements.push_back({"INSERT INTO counter VALUES('attempt_next', $1) ON CONFLICT (name) DO UPDATE SET value = excluded.value",
                           PostgresParameters().Add(*attempt_next_)});
   }
+}
+
+void PostgresBatch::AddAttempts(std::vector<PostgresStatement>& statements) const {
+  PostgresArray job, ended, number, task, kind, worker, lasted, outcome, cause, message, cpu_seconds, memory_peak;
+  PostgresArray log_job, log_ended, log_number, log_task, log;
+  for (const core::AttemptEnded* attempt : attempts_) {
+    const std::int64_t at = absl::ToUnixMicros(attempt->ended);
+    job.Add(attempt->job);
+    ended.Add(at);
+    number.Add(attempt->attempt);
+    task.Add(attempt->task);
+    kind.Add(static_cast<std::int64_t>(attempt->kind));
+    worker.Add(attempt->worker);
+    lasted.Add(absl::ToInt64Microseconds(attempt->lasted));
+    outcome.Add(static_cast<std::int64_t>(attempt->outcome));
+    cause.Add(static_cast<std::int64_t>(attempt->cause));
+    message.Add(attempt->message);
+    cpu_seconds.Add(attempt->cpu_seconds);
+    memory_peak.Add(attempt->memory_peak);
+    if (attempt->log.empty()) continue;
+    log_job.Add(attempt->job);
+    log_ended.Add(at);
+    log_number.Add(attempt->attempt);
+    log_task.Add(attempt->task);
+    log.AddBytes(attempt->log);
+  }
+  AddStatement(statements,
+               "INSERT INTO attempt SELECT * FROM unnest($1::text[], $2::bigint[], $3::bigint[], $4::text[], $5::int[], $6::text[], $7::bigint[], "
+               "$8::int[], $9::int[], $10::text[], $11::float8[], $12::bigint[]) ON CONFLICT DO NOTHING",
+               job, ended, number, task, kind, worker, lasted, outcome, cause, message, cpu_seconds, memory_peak);
+  AddStatement(statements,
+               "INSERT INTO attempt_log SELECT * FROM unnest($1::text[], $2::bigint[], $3::bigint[], $4::text[], $5::bytea[]) "
+               "ON CONFLICT DO NOTHING",
+               log_job, log_ended, log_number, log_task, log);
+  if (!forgotten_) return;
+  statements.push_back(
+      {"WITH old AS (SELECT job, ended, number, task FROM attempt WHERE job IN (SELECT job FROM ended_job) AND ended < $1 "
+       "ORDER BY job, ended, number, task LIMIT $2), "
+       "logs AS (DELETE FROM attempt_log WHERE (job, ended, number, task) IN (SELECT * FROM old)) "
+       "DELETE FROM attempt WHERE (job, ended, number, task) IN (SELECT * FROM old)",
+       PostgresParameters().Add(absl::ToUnixMicros(forgotten_->before)).Add(forgotten_->count_max)});
 }
 
 }  // namespace vorocast::store

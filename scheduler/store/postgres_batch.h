@@ -25,6 +25,7 @@ class PostgresBatch {
   void operator()(const SequenceClosed& record) { closed_.insert(record.sequence); }
   void operator()(const JobAdded& record) { jobs_.push_back(&record); }
   void operator()(const JobEnded& record) { ended_[record.job] = &record; }
+  void operator()(const AttemptsForgotten& record) { forgotten_ = record; }
   void operator()(const core::Record& record) { std::visit(*this, record); }
   void operator()(const core::ResultMade& record) { results_[record.key] = &record.result; }
   void operator()(const core::TaskFailed& record) { failures_[{record.job, record.task}] = &record; }
@@ -35,11 +36,13 @@ class PostgresBatch {
   void operator()(const core::JobRetried& record);
   void operator()(const core::JobPaused& record) { paused_[record.job] = record.paused; }
   void operator()(const core::JobLimited& record) { limited_[record.job] = &record; }
+  void operator()(const core::AttemptEnded& record) { attempts_.push_back(&record); }
 
  private:
   void AddCaptures(std::vector<PostgresStatement>& statements) const;
   void AddJobs(std::vector<PostgresStatement>& statements) const;
   void AddRuns(std::vector<PostgresStatement>& statements) const;
+  void AddAttempts(std::vector<PostgresStatement>& statements) const;
 
   // The records must outlive the batch, as all of these point into them.
   std::vector<const SequenceOpened*> opened_;
@@ -55,6 +58,8 @@ class PostgresBatch {
   std::map<base::Digest, const core::Result*> results_;
   std::map<base::Digest, const core::RunSaved*> runs_;  // null: ended
   std::optional<std::int64_t> attempt_next_;
+  std::vector<const core::AttemptEnded*> attempts_;
+  std::optional<AttemptsForgotten> forgotten_;
 };
 
 }  // namespace vorocast::store

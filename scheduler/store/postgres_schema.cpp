@@ -46,6 +46,14 @@ ALTER TABLE ended_job ADD COLUMN ended double precision NOT NULL DEFAULT 0;
 ALTER TABLE run ADD COLUMN time_raised integer NOT NULL DEFAULT 0, ADD COLUMN copy_attempt bigint NOT NULL DEFAULT 0,
   ADD COLUMN copy_worker text NOT NULL DEFAULT '';
 )"},
+    // What became of each attempt, in the order that a job's attempts ended (microseconds since 1970), and what the few that print printed.
+    {3, R"(
+CREATE TABLE attempt(job text COLLATE "C" NOT NULL, ended bigint NOT NULL, number bigint NOT NULL, task text COLLATE "C" NOT NULL,
+  kind integer NOT NULL, worker text NOT NULL, lasted bigint NOT NULL, outcome integer NOT NULL, cause integer NOT NULL, message text NOT NULL,
+  cpu_seconds double precision NOT NULL, memory_peak bigint NOT NULL, PRIMARY KEY(job, ended, number, task));
+CREATE TABLE attempt_log(job text COLLATE "C" NOT NULL, ended bigint NOT NULL, number bigint NOT NULL, task text COLLATE "C" NOT NULL,
+  log bytea NOT NULL, PRIMARY KEY(job, ended, number, task));
+)"},
 };
 
 }  // namespace

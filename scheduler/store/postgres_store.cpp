@@ -37,6 +37,29 @@ constexpr const char* kRuns =
 constexpr const char* kResult =
     "SELECT encode(sha256, 'hex'), size, seconds, cpu_seconds, memory_peak, made_for FROM result WHERE key = decode($1, 'hex')";
 
+/// $1 job, $2 task or empty, $3 to $5 the place after which to begin, $6 how many at most, $7 with logs.
+constexpr const char* kAttempts =
+    "SELECT a.job, a.ended, a.number, a.task, kind, worker, lasted, outcome, cause, message, cpu_seconds, memory_peak, coalesce(l.log, ''::bytea) "
+    "FROM attempt a LEFT JOIN attempt_log l ON $7::int = 1 AND l.job = a.job AND l.ended = a.ended AND l.number = a.number AND l.task = a.task "
+    "WHERE a.job = $1 AND ($2 = '' OR a.task = $2) AND (a.ended, a.number, a.task) > ($3::bigint, $4::bigint, $5::text) "
+    "ORDER BY a.ended, a.number, a.task LIMIT $6::int";
+
+core::AttemptEnded AttemptOf(const PostgresRows& rows, int row) {
+  return {.job = rows.Text(row, 0),
+          .task = rows.Text(row, 3),
+          .kind = static_cast<tasks::Kind>(rows.Integer(row, 4)),
+          .attempt = rows.Integer(row, 2),
+          .worker = rows.Text(row, 5),
+          .lasted = absl::Microseconds(rows.Integer(row, 6)),
+          .ended = absl::FromUnixMicros(rows.Integer(row, 1)),
+          .outcome = static_cast<core::AttemptEnded::Outcome>(rows.Integer(row, 7)),
+          .cause = static_cast<core::Cause>(rows.Integer(row, 8)),
+          .message = rows.Text(row, 9),
+          .cpu_seconds = rows.Number(row, 10),
+          .memory_peak = rows.Integer(row, 11),
+          .log = rows.Bytes(row, 12)};
+}
+
 FrameAdded FrameOf(const PostgresRows& rows, int row) {
   return {.sequence = rows.Text(row, 0),
           .number = static_cast<std::int32_t>(rows.Integer(row, 1)),
@@ -111,6 +134,18 @@ class PostgresStore final : public Store {
     std::vector<FrameAdded> frames;
     for (int row = 0; row < rows.size(); ++row) frames.push_back(FrameOf(rows, row));
     return frames;
+  }
+
+  absl::StatusOr<std::vector<core::AttemptEnded>> FindAttempts(const AttemptQuery& query) override {
+    const core::AttemptEnded before_all{.ended = absl::InfinitePast()};
+    const core::AttemptEnded& after = query.after ? *query.after : before_all;
+    PostgresParameters parameters;
+    parameters.Add(query.job).Add(query.task).Add(absl::ToUnixMicros(after.ended)).Add(after.attempt).Add(after.task);
+    parameters.Add(std::int64_t{query.count_max}).Add(std::int64_t{query.logs ? 1 : 0});
+    ASSIGN_OR_RETURN(const PostgresRows rows, Read({kAttempts, std::move(parameters)}));
+    std::vector<core::AttemptEnded> attempts;
+    for (int row = 0; row < rows.size(); ++row) attempts.push_back(AttemptOf(rows, row));
+    return attempts;
   }
 
  private:

@@ -44,6 +44,14 @@ ALTER TABLE run ADD COLUMN time_raised INTEGER NOT NULL DEFAULT 0;
 ALTER TABLE run ADD COLUMN copy_attempt INTEGER NOT NULL DEFAULT 0;
 ALTER TABLE run ADD COLUMN copy_worker TEXT NOT NULL DEFAULT '';
 )"},
+    // What became of each attempt, in the order that a job's attempts ended (microseconds since 1970), and what the few that print printed.
+    {4, R"(
+CREATE TABLE attempt(job TEXT NOT NULL, ended INTEGER NOT NULL, number INTEGER NOT NULL, task TEXT NOT NULL, kind INTEGER NOT NULL,
+  worker TEXT NOT NULL, lasted INTEGER NOT NULL, outcome INTEGER NOT NULL, cause INTEGER NOT NULL, message TEXT NOT NULL, cpu_seconds REAL NOT NULL,
+  memory_peak INTEGER NOT NULL, PRIMARY KEY(job, ended, number, task)) WITHOUT ROWID;
+CREATE TABLE attempt_log(job TEXT NOT NULL, ended INTEGER NOT NULL, number INTEGER NOT NULL, task TEXT NOT NULL, log BLOB NOT NULL,
+  PRIMARY KEY(job, ended, number, task));
+)"},
 };
 
 absl::StatusOr<std::int64_t> AskInteger(SqliteConnection& connection, std::string_view sql) {

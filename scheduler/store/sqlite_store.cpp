@@ -16,6 +16,14 @@
 namespace vorocast::store {
 namespace {
 
+// The logs go with the same attempts, and before them.
+constexpr const char* kForgetLogs =
+    "DELETE FROM attempt_log WHERE (job, ended, number, task) IN (SELECT job, ended, number, task FROM attempt "
+    "WHERE job IN (SELECT job FROM ended_job) AND ended < ? ORDER BY job, ended, number, task LIMIT ?)";
+constexpr const char* kForgetAttempts =
+    "DELETE FROM attempt WHERE (job, ended, number, task) IN (SELECT job, ended, number, task FROM attempt "
+    "WHERE job IN (SELECT job FROM ended_job) AND ended < ? ORDER BY job, ended, number, task LIMIT ?)";
+
 /// Writes one record; statements are prepared once.
 class RecordWriter {
  public:
@@ -39,6 +47,10 @@ class RecordWriter {
   absl::Status operator()(const JobEnded& r) {
     return Write("INSERT OR REPLACE INTO ended_job(job, summary, whole, ended) VALUES(?,?,?,?)", r.job, Bytes{r.summary}, Bytes{r.whole}, r.ended);
   }
+  absl::Status operator()(const AttemptsForgotten& r) {
+    RETURN_IF_ERROR(Write(kForgetLogs, absl::ToUnixMicros(r.before), r.count_max));
+    return Write(kForgetAttempts, absl::ToUnixMicros(r.before), r.count_max);
+  }
   absl::Status operator()(const core::Record& record) { return std::visit(*this, record); }
   absl::Status operator()(const core::ResultMade& r) {
     return Write("INSERT OR REPLACE INTO result VALUES(?,?,?,?,?,?,?)", r.key, r.result.sha256, r.result.size, r.result.seconds, r.result.cpu_seconds,
@@ -56,6 +68,14 @@ class RecordWriter {
   absl::Status operator()(const core::RunEnded& r) { return Write("DELETE FROM run WHERE key = ?", r.key); }
   absl::Status operator()(const core::AttemptsReserved& r) { return Write("INSERT OR REPLACE INTO meta VALUES('attempt_next', ?)", r.next); }
   absl::Status operator()(const core::JobCancelled& r) { return Write("UPDATE job SET cancelled = 1 WHERE id = ?", r.job); }
+  absl::Status operator()(const core::AttemptEnded& r) {
+    const std::int64_t ended = absl::ToUnixMicros(r.ended);
+    RETURN_IF_ERROR(Write("INSERT OR IGNORE INTO attempt VALUES(?,?,?,?,?,?,?,?,?,?,?,?)", r.job, ended, r.attempt, r.task,
+                          static_cast<std::int32_t>(r.kind), r.worker, absl::ToInt64Microseconds(r.lasted), static_cast<std::int32_t>(r.outcome),
+                          static_cast<std::int32_t>(r.cause), r.message, r.cpu_seconds, r.memory_peak));
+    if (r.log.empty()) return absl::OkStatus();
+    return Write("INSERT OR IGNORE INTO attempt_log VALUES(?,?,?,?,?)", r.job, ended, r.attempt, r.task, Bytes{r.log});
+  }
   absl::Status operator()(const core::JobRetried& r) {
     RETURN_IF_ERROR(Write("UPDATE job SET cancelled = 0 WHERE id = ?", r.job));
     RETURN_IF_ERROR(Write("DELETE FROM ended_job WHERE job = ?", r.job));
@@ -125,6 +145,28 @@ constexpr std::string_view kFailures =
 constexpr std::string_view kRuns =
     "SELECT key, attempt, worker, failed, interrupted, memory_raised, time_raised, copy_attempt, copy_worker FROM run ORDER BY key";
 constexpr std::string_view kResult = "SELECT sha256, size, seconds, cpu_seconds, memory_peak, made_for FROM result WHERE key = ?";
+
+/// ?1 job, ?2 task or empty, ?3 to ?5 the place after which to begin, ?6 how many at most, ?7 with logs.
+constexpr std::string_view kAttempts =
+    "SELECT a.job, a.ended, a.number, a.task, kind, worker, lasted, outcome, cause, message, cpu_seconds, memory_peak, coalesce(l.log, x'') "
+    "FROM attempt a LEFT JOIN attempt_log l ON ?7 AND l.job = a.job AND l.ended = a.ended AND l.number = a.number AND l.task = a.task "
+    "WHERE a.job = ?1 AND (?2 = '' OR a.task = ?2) AND (a.ended, a.number, a.task) > (?3, ?4, ?5) ORDER BY a.ended, a.number, a.task LIMIT ?6";
+
+core::AttemptEnded AttemptOf(const SqliteStatement& row) {
+  return {.job = row.Text(0),
+          .task = row.Text(3),
+          .kind = static_cast<tasks::Kind>(row.Integer(4)),
+          .attempt = row.Integer(2),
+          .worker = row.Text(5),
+          .lasted = absl::Microseconds(row.Integer(6)),
+          .ended = absl::FromUnixMicros(row.Integer(1)),
+          .outcome = static_cast<core::AttemptEnded::Outcome>(row.Integer(7)),
+          .cause = static_cast<core::Cause>(row.Integer(8)),
+          .message = row.Text(9),
+          .cpu_seconds = row.Number(10),
+          .memory_peak = row.Integer(11),
+          .log = row.Blob(12)};
+}
 
 FrameAdded FrameOf(const SqliteStatement& row) {
   return {.sequence = row.Text(0),
@@ -236,6 +278,21 @@ class SqliteStore final : public Store {
       return absl::OkStatus();
     }));
     return frames;
+  }
+
+  absl::StatusOr<std::vector<core::AttemptEnded>> FindAttempts(const AttemptQuery& query) override {
+    const std::lock_guard lock(reading_mutex_);
+    ASSIGN_OR_RETURN(SqliteStatement statement, SqliteStatement::Prepare(reading_, kAttempts));
+    const core::AttemptEnded before_all{.ended = absl::InfinitePast()};
+    const core::AttemptEnded& after = query.after ? *query.after : before_all;
+    statement.Bind(query.job).Bind(query.task).Bind(absl::ToUnixMicros(after.ended)).Bind(after.attempt).Bind(after.task);
+    statement.Bind(query.count_max).Bind(query.logs ? 1 : 0);
+    std::vector<core::AttemptEnded> attempts;
+    RETURN_IF_ERROR(ForEachRow(statement, [&](const SqliteStatement& row) {
+      attempts.push_back(AttemptOf(row));
+      return absl::OkStatus();
+    }));
+    return attempts;
   }
 
  private:

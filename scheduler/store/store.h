@@ -7,6 +7,7 @@
 #include <variant>
 #include <vector>
 
+#include "absl/time/time.h"
 #include "scheduler/core/record.h"
 #include "services/base/digest.h"
 #include "services/base/status.h"
@@ -50,7 +51,13 @@ struct JobEnded {
   double ended = 0;     // seconds since 1970
 };
 
-using Record = std::variant<SequenceOpened, FrameAdded, SequenceClosed, JobAdded, JobEnded, core::Record>;
+/// Drops attempts of ended jobs that ended before `before`, at most so many at once: a long backlog goes little by little.
+struct AttemptsForgotten {
+  absl::Time before;
+  std::int64_t count_max = 0;
+};
+
+using Record = std::variant<SequenceOpened, FrameAdded, SequenceClosed, JobAdded, JobEnded, AttemptsForgotten, core::Record>;
 
 struct StoredSequence {
   SequenceOpened opened;
@@ -76,6 +83,16 @@ struct Snapshot {
 };
 
 enum class JobText { kSummary, kWhole };
+
+/// Which attempts of a job are asked for.
+struct AttemptQuery {
+  std::string job;
+  std::string task;   // a task's name; empty: all
+  bool logs = false;  // with what they printed
+  /// Only those after this one in the order that they ended; for the next portion, the last of the one before.
+  std::optional<core::AttemptEnded> after;
+  std::int32_t count_max = 1000;
+};
 
 /// One scheduler at a time writes. It leads under a term, a number larger than that of every leader before it, and every batch is written only
 /// while that term is the newest: a leader that was stopped for a while, and replaced meanwhile, cannot overwrite what its successor did.
@@ -104,6 +121,8 @@ class Store {
   virtual absl::StatusOr<std::string> FindJobText(const std::string& job, JobText which) = 0;
   /// By number.
   virtual absl::StatusOr<std::vector<FrameAdded>> LoadFrames(const std::string& sequence) = 0;
+  /// In the order that they ended, to the microsecond.
+  virtual absl::StatusOr<std::vector<core::AttemptEnded>> FindAttempts(const AttemptQuery& query) = 0;
 };
 
 }  // namespace vorocast::store

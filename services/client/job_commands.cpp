@@ -11,6 +11,7 @@
 #include "services/client/commands.h"
 #include "services/client/embedded_service.h"
 #include "services/client/interrupt.h"
+#include "services/client/job_choice.h"
 #include "services/client/job_flags.h"
 #include "services/client/job_view.h"
 #include "services/client/percent_view.h"
@@ -18,43 +19,6 @@
 
 namespace vorocast::client {
 namespace {
-
-/// Which scheduler is meant: --to, else $VOROCAST_SCHEDULER, else the one that serves --state on this machine.
-struct SchedulerFlags {
-  std::string to, state;
-
-  void AddTo(CLI::App& command) {
-    command.add_option("--to", to, "Scheduler's address, HOST:PORT; A,B where one stands by (VOROCAST_SCHEDULER, or the one serving --state here)")
-        ->envname("VOROCAST_SCHEDULER");
-    command.add_option("--state", state, "State folder of a scheduler on this machine (~/.cache/vorocast)");
-  }
-  absl::StatusOr<SchedulerClient> Connect() const {
-    if (!to.empty()) return SchedulerClient(to);
-    ASSIGN_OR_RETURN(const std::string address, RunningSchedulerAddress(state.empty() ? DefaultStateFolder() : std::filesystem::path(state)));
-    return SchedulerClient(address);
-  }
-};
-
-/// A job command's flags: the scheduler and a job, by default the newest.
-struct JobChoice {
-  SchedulerFlags scheduler;
-  std::string job_id;
-
-  void AddTo(CLI::App& command) {
-    command.add_option("job", job_id, "Job id as 'vorocast status' lists it (the newest)");
-    scheduler.AddTo(command);
-  }
-};
-
-using JobAction = std::function<absl::Status(SchedulerClient&, const std::string& job_id)>;
-
-absl::Status WithJob(const JobChoice& choice, const JobAction& action) {
-  ASSIGN_OR_RETURN(SchedulerClient client, choice.scheduler.Connect());
-  if (!choice.job_id.empty()) return action(client, choice.job_id);
-  ASSIGN_OR_RETURN(const std::vector<v1::Job> jobs, client.List(1));
-  if (jobs.empty()) return absl::NotFoundError(fmt::format("the scheduler at {} has no jobs; 'vorocast submit' makes one", client.address()));
-  return action(client, jobs.front().id());
-}
 
 /// Shows the job until it has ended; an error unless it is done then.
 absl::Status FollowToItsEnd(SchedulerClient& client, const std::string& job_id) {
@@ -65,8 +29,6 @@ absl::Status FollowToItsEnd(SchedulerClient& client, const std::string& job_id) 
   if (job.state() == v1::DONE) return absl::OkStatus();
   return absl::AbortedError(fmt::format("job {} is not done; 'vorocast explain {}' says why", job_id, job_id));
 }
-
-void SetExitCode(int& exit_code, const absl::Status& status) { exit_code = status.ok() ? 0 : PrintError(status); }
 
 /// A command that does one thing with one job.
 CLI::App& AddJobCommand(CLI::App& program, int& exit_code, const std::string& name, const std::string& description, const JobAction& action) {

@@ -32,6 +32,12 @@ class SchedulerClient {
   absl::StatusOr<v1::Job> Submit(const v1::SubmitJobRequest& request);
   absl::StatusOr<v1::Job> Get(const std::string& job_id);
   absl::StatusOr<std::vector<v1::Job>> List(std::int32_t limit);
+  /// The newest jobs, of one session if that is not empty, and who works.
+  absl::StatusOr<v1::ListJobsReply> ListAll(std::int32_t limit, const std::string& session);
+  /// Calls `seen` with each attempt at the job's tasks, in the order that they ended; those that still run come last.
+  absl::Status Attempts(const v1::AttemptsRequest& request, const std::function<void(const v1::TaskAttempt&)>& seen);
+  /// One result or captured frame ("capture/frame_000412.ply"). RESOURCE_EXHAUSTED when it has more than `bytes_max`.
+  absl::StatusOr<std::string> FetchBytes(const std::string& job_id, const std::string& name, std::int64_t bytes_max);
   absl::StatusOr<v1::Job> Cancel(const std::string& job_id);
   absl::StatusOr<v1::Job> Retry(const std::string& job_id);
   absl::StatusOr<std::string> Explain(const std::string& job_id, const std::string& task);

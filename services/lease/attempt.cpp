@@ -18,7 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// A child that dies of an uncaught bad_alloc says so on standard error and aborts.
-bool RanOutOfMemory(const ChildEnd& end) { return end.code == SIGABRT && end.error_tail.find("std::bad_alloc") != std::string::npos; }
+bool RanOutOfMemory(const ChildEnd& end) { return end.code == SIGABRT && end.printed.find("std::bad_alloc") != std::string::npos; }
 
 std::string SignalName(int signal) {
   const char* name = ::sigabbrev_np(signal);
@@ -28,8 +28,18 @@ std::string SignalName(int signal) {
 std::string CrashMessage(const ChildEnd& end) {
   std::string message = fmt::format("killed by {}", SignalName(end.code));
   if (end.code == SIGKILL) message += " from outside, perhaps because the machine ran out of memory";
-  const std::string tail = TailForPeople(end.error_tail, kMessageBytesMax / 2);
+  const std::string tail = TailForPeople(end.printed, kMessageBytesMax / 2);
   return tail.empty() ? message : fmt::format("{}; it last wrote: {}", message, tail);
+}
+
+/// What an attempt printed goes along, whatever became of it; of most that is nothing.
+v1::Finished WithLog(v1::Finished finished, const ChildEnd& end) {
+  finished.set_log(TailForPeople(end.printed, kLogBytesMax));
+  if (finished.has_failed()) {
+    finished.mutable_failed()->set_cpu_seconds(end.cpu_seconds);
+    finished.mutable_failed()->set_memory_peak(end.memory_peak);
+  }
+  return finished;
 }
 
 v1::Finished SucceededAttempt(const v1::AttemptId& id, const base::Digest& digest, std::int64_t size, const ChildEnd& end) {
@@ -121,29 +131,33 @@ v1::Finished Attempt::RunSpec(const tasks::TaskSpec& spec) {
     if (said.outcome) outcome = said.outcome;
   });
   if (!end.ok()) return Fail(v1::Failed::INTERNAL, std::string(end.status().message()), 0);
+  return WithLog(Judge(spec, output.path, *end, outcome), *end);
+}
 
-  switch (end->how) {
+v1::Finished Attempt::Judge(const tasks::TaskSpec& spec, const fs::path& output, const ChildEnd& child,
+                            const std::optional<absl::Status>& outcome) const {
+  switch (child.how) {
     case ChildEnd::How::kStopped:
-      return Fail(v1::Failed::DRAINED, "stopped before it was done", end->seconds);
+      return Fail(v1::Failed::DRAINED, "stopped before it was done", child.seconds);
     case ChildEnd::How::kTimedOut:
-      return Fail(v1::Failed::TIMED_OUT, fmt::format("still running after its limit of {} s", lease_.time_limit_s()), end->seconds);
+      return Fail(v1::Failed::TIMED_OUT, fmt::format("still running after its limit of {} s", lease_.time_limit_s()), child.seconds);
     case ChildEnd::How::kSignalled:
-      if (RanOutOfMemory(*end)) {
-        return Fail(v1::Failed::OUT_OF_MEMORY, fmt::format("needs more memory than its limit of {} MiB", lease_.memory_limit() >> 20), end->seconds);
+      if (RanOutOfMemory(child)) {
+        return Fail(v1::Failed::OUT_OF_MEMORY, fmt::format("needs more memory than its limit of {} MiB", lease_.memory_limit() >> 20), child.seconds);
       }
       // A cluster that takes its machine back tells every process of a worker at once.
-      if (end->code == SIGTERM) return Fail(v1::Failed::DRAINED, "ended by SIGTERM from outside", end->seconds);
-      return Fail(v1::Failed::CRASHED, CrashMessage(*end), end->seconds);
+      if (child.code == SIGTERM) return Fail(v1::Failed::DRAINED, "ended by SIGTERM from outside", child.seconds);
+      return Fail(v1::Failed::CRASHED, CrashMessage(child), child.seconds);
     case ChildEnd::How::kExited:
       break;
   }
   if (!outcome) {
-    const std::string tail = TailForPeople(end->error_tail, kMessageBytesMax / 2);
-    return Fail(v1::Failed::INTERNAL, fmt::format("{} ended with code {} and no outcome; it last wrote: {}", program_.string(), end->code, tail),
-                end->seconds);
+    const std::string tail = TailForPeople(child.printed, kMessageBytesMax / 2);
+    return Fail(v1::Failed::INTERNAL, fmt::format("{} ended with code {} and no outcome; it last wrote: {}", program_.string(), child.code, tail),
+                child.seconds);
   }
-  if (!outcome->ok()) return Fail(CauseOf(*outcome), std::string(outcome->message()), end->seconds);
-  return Publish(spec, output.path, *end);
+  if (!outcome->ok()) return Fail(CauseOf(*outcome), std::string(outcome->message()), child.seconds);
+  return Publish(spec, output, child);
 }
 
 /// Publishes `output` (empty: the result is in place already) and tells what is in place then: of two attempts the first result stays.

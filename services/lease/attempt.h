@@ -4,6 +4,7 @@
 #include <atomic>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <thread>
 
@@ -29,6 +30,9 @@ class Attempt {
  private:
   v1::Finished Run();
   v1::Finished RunSpec(const tasks::TaskSpec& spec);
+  /// What follows from how the child ended and what it said last.
+  v1::Finished Judge(const tasks::TaskSpec& spec, const std::filesystem::path& output, const ChildEnd& child,
+                     const std::optional<absl::Status>& outcome) const;
   v1::Finished Publish(const tasks::TaskSpec& spec, const std::filesystem::path& output, const ChildEnd& end) const;
   v1::Finished Fail(v1::Failed::Cause cause, std::string_view message, double seconds) const;
 

@@ -27,7 +27,7 @@ namespace {
 
 using SteadyTime = std::chrono::steady_clock::time_point;
 
-constexpr std::size_t kErrorTailBytes = 8 << 10;
+constexpr std::size_t kPrintedBytes = 64 << 10;
 constexpr std::size_t kLineBytesMax = 1 << 20;
 /// How often the child is looked at while its pipes are silent, and after it has closed them.
 constexpr int kQuietPollMs = 200;
@@ -100,7 +100,10 @@ class Child {
     return ::wait4(pid_, &status, WNOHANG, &usage) == pid_ ? std::optional(status) : std::nullopt;
   }
 
-  std::string TakeErrorTail() { return std::move(error_tail_); }
+  std::string TakePrinted() {
+    if (printed_.size() > kPrintedBytes) printed_.erase(0, printed_.size() - kPrintedBytes);
+    return std::move(printed_);
+  }
 
  private:
   void WriteInput() {
@@ -141,8 +144,9 @@ class Child {
 
   void ReadError() {
     ReadInto(error_, [&](std::string_view bytes) {
-      error_tail_.append(bytes);
-      if (error_tail_.size() > kErrorTailBytes) error_tail_.erase(0, error_tail_.size() - kErrorTailBytes);
+      printed_.append(bytes);
+      // Twice as much before anything is moved, so that a child that prints without end costs little.
+      if (printed_.size() > 2 * kPrintedBytes) printed_.erase(0, printed_.size() - kPrintedBytes);
     });
   }
 
@@ -152,7 +156,7 @@ class Child {
   FileDescriptor error_;
   std::string_view to_write_;
   std::string line_;
-  std::string error_tail_;
+  std::string printed_;
 };
 
 double Seconds(const timeval& time) { return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec); }
@@ -214,7 +218,7 @@ absl::StatusOr<ChildEnd> RunChild(const ChildCommand& command, const StopFlag& s
 
   if (!killed) end.how = WIFSIGNALED(*status) ? ChildEnd::How::kSignalled : ChildEnd::How::kExited;
   end.code = WIFSIGNALED(*status) ? WTERMSIG(*status) : WEXITSTATUS(*status);
-  end.error_tail = child.TakeErrorTail();
+  end.printed = child.TakePrinted();
   end.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   end.cpu_seconds = Seconds(usage.ru_utime) + Seconds(usage.ru_stime);
   end.memory_peak = static_cast<std::int64_t>(usage.ru_maxrss) * 1024;

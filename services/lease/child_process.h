@@ -58,7 +58,7 @@ struct ChildEnd {
   enum class How : std::uint8_t { kExited, kSignalled, kTimedOut, kStopped };
   How how = How::kExited;
   int code = 0;                  // exit code, or the signal's number
-  std::string error_tail;        // the last 8 KiB of its standard error
+  std::string printed;           // the last 64 KiB of its standard error
   double seconds = 0;            // wall clock
   double cpu_seconds = 0;        // user and system
   std::int64_t memory_peak = 0;  // bytes resident

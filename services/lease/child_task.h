@@ -37,5 +37,6 @@ ChildLine DecodeChildLine(std::string_view line);
 std::string TextForPeople(std::string_view text, std::size_t bytes_max);
 std::string TailForPeople(std::string_view text, std::size_t bytes_max);
 inline constexpr std::size_t kMessageBytesMax = 4000;
+inline constexpr std::size_t kLogBytesMax = 64 << 10;
 
 }  // namespace vorocast::lease

@@ -11,10 +11,12 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 #include "services/lease/attempt.h"
 #include "services/lease/dispatch_stream.h"
 #include "services/lease/drain_signals.h"
 #include "services/lease/event_queue.h"
+#include "services/lease/lease_metrics.h"
 #include "services/rpc/channel.h"
 
 namespace vorocast::lease {
@@ -85,6 +87,7 @@ class LeaseLoop {
       RunTimers();
       if (std::optional<Event> event = events_.Pop(NextTimer())) {
         std::visit([this](auto& e) { On(e); }, *event);
+        if (options_.metrics) options_.metrics->SetBusy(running_.size());
       }
     }
     return SayFarewell();
@@ -104,7 +107,7 @@ class LeaseLoop {
     if (heartbeat_.passed()) SendHeartbeat();
     if (away_.passed()) {
       away_.Clear();
-      Log(fmt::format("the scheduler has been away for {}", absl::FormatDuration(options_.leave_after)));
+      Log(fmt::format("the scheduler has been away: time={}", absl::FormatDuration(options_.leave_after)));
       if (!draining_) Drain();
     }
     if (drain_.passed()) {
@@ -137,9 +140,11 @@ class LeaseLoop {
 
   void EndStream(const std::string& why) {
     NoteAway();
-    if (welcomed_ || !lost_) Log(fmt::format("lost the scheduler at {}: {}; trying again until it is back", scheduler().address, why));
+    if (welcomed_ || !lost_)
+      Log(fmt::format("lost the scheduler, trying again until it is back: scheduler={} reason=\"{}\"", scheduler().address, why));
     lost_ = true;
     welcomed_ = false;
+    if (options_.metrics) options_.metrics->SetConnected(false);
     welcome_.Clear();
     stream_.reset();
     reconnect_.Set(backoff_);
@@ -174,13 +179,13 @@ class LeaseLoop {
 
   void OnWelcome(const v1::Welcome& welcome) {
     welcomed_ = true;
+    if (options_.metrics) options_.metrics->SetConnected(true);
     welcome_.Clear();
     away_.Clear();
     lost_ = false;
     backoff_ = kReconnectFirst;
     OpenStore(welcome.artifact_root());
-    Log(fmt::format("takes tasks from the scheduler at {}, {} at once; results go to {}", scheduler().address, options_.slots,
-                    welcome.artifact_root()));
+    Log(fmt::format("takes tasks: scheduler={} slots={} results=\"{}\"", scheduler().address, options_.slots, welcome.artifact_root()));
     for (const v1::AttemptId& id : welcome.drop()) Drop(id);
     for (const auto& [key, report] : reports_) SendReport(report);
     if (draining_) SendLeaving();
@@ -190,7 +195,7 @@ class LeaseLoop {
   void OpenStore(const std::string& root) {
     if (store_.ok() && store_->root() == root) return;
     store_ = storage::ArtifactStore::Open(root);
-    if (!store_.ok()) return Log(std::string(store_.status().message()));
+    if (!store_.ok()) return Log(fmt::format("the artifact folder cannot be used: error=\"{}\"", std::string(store_.status().message())));
     store_->RemoveStaleTemporaries(kLeftoverAge);
   }
 
@@ -231,6 +236,7 @@ class LeaseLoop {
     if (attempt == running_.end()) return;
     const bool wanted = dropped_.erase(key) == 0;
     if (wanted) LogEnd(attempt->second->lease(), event.finished);
+    if (wanted && options_.metrics) options_.metrics->AttemptEnded(event.finished);
     running_.erase(attempt);
     if (wanted) Conclude(std::move(event.finished));
     StartWaiting();
@@ -238,9 +244,11 @@ class LeaseLoop {
 
   void LogEnd(const v1::Lease& lease, const v1::Finished& finished) const {
     if (finished.has_failed()) {
-      Log(fmt::format("{}: {}: {}", lease.label(), v1::Failed::Cause_Name(finished.failed().cause()), finished.failed().message()));
+      spdlog::warn("attempt failed: task=\"{}\" attempt={} worker={} cause={} message=\"{}\"", lease.label(), lease.id().attempt(), name_,
+                   v1::Failed::Cause_Name(finished.failed().cause()), finished.failed().message());
     } else {
-      Log(fmt::format("{}: done in {:.2f} s", lease.label(), finished.succeeded().seconds()));
+      spdlog::info("attempt done: task=\"{}\" attempt={} worker={} seconds={:.2f}", lease.label(), lease.id().attempt(), name_,
+                   finished.succeeded().seconds());
     }
   }
 
@@ -286,7 +294,7 @@ class LeaseLoop {
     draining_ = true;
     drain_.Set(options_.drain_time);
     farewell_.Set(options_.drain_time + kFarewellTime);
-    Log(fmt::format("leaving: {} tasks get {} to end", running_.size(), absl::FormatDuration(options_.drain_time)));
+    Log(fmt::format("leaving: running={} drain_time={}", running_.size(), absl::FormatDuration(options_.drain_time)));
     if (welcomed_) SendLeaving();
     for (const auto& [key, lease] : std::exchange(waiting_, {})) Conclude(FailedAttempt(lease.id(), v1::Failed::DRAINED, "the worker is leaving", 0));
   }
@@ -316,7 +324,8 @@ class LeaseLoop {
                                               reports_.size(), options_.scheduler));
   }
 
-  void Log(const std::string& text) const { fmt::print(stderr, "worker {}: {}\n", name_, text); }
+  /// `what` ends with at least one field.
+  void Log(const std::string& what) const { spdlog::info("{} worker={}", what, name_); }
 
   const LeaseLoopOptions options_;
   const std::string name_;

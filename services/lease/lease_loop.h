@@ -12,6 +12,8 @@
 
 namespace vorocast::lease {
 
+class LeaseMetrics;
+
 /// What a scheduler takes.
 inline constexpr std::int32_t kSlotsMax = 4096;
 inline constexpr std::size_t kNameMax = 200;
@@ -24,6 +26,7 @@ struct LeaseLoopOptions {
   absl::Duration heartbeat = absl::Seconds(2);
   absl::Duration leave_after = absl::InfiniteDuration();  // leaves by itself when the scheduler has been away so long
   absl::Duration drain_time = absl::Seconds(30);          // after SIGTERM, what still runs then is given back
+  LeaseMetrics* metrics = nullptr;                        // told what happens; must outlive the loop
 };
 
 /// How it came to an end.

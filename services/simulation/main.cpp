@@ -15,10 +15,12 @@
 #include "services/lease/drain_signals.h"
 #include "services/lease/lease_flags.h"
 #include "services/lease/lease_loop.h"
+#include "services/lease/lease_metrics.h"
 #include "services/rpc/server.h"
 #include "services/simulation/simulate_executor.h"
 #include "services/simulation/simulation_service.h"
 #include "services/simulation/try_effect.h"
+#include "services/telemetry/telemetry_flags.h"
 
 namespace {
 
@@ -31,6 +33,7 @@ constexpr char kStory[] =
 
 struct Options {
   lease::LeaseLoopOptions lease;
+  telemetry::TelemetryFlags telemetry;
   std::string listen;
   std::string store;
 };
@@ -46,7 +49,11 @@ void WaitForSignal() {
   signalled.wait();
 }
 
-absl::Status Serve(const Options& options) {
+absl::Status Serve(Options& options) {
+  RETURN_IF_ERROR(options.telemetry.StartLog("simulation"));
+  lease::LeaseMetrics metrics("simulation", options.lease.slots);
+  ASSIGN_OR_RETURN(const auto metrics_server, options.telemetry.StartMetrics(metrics.registry()));
+  options.lease.metrics = &metrics;
   std::unique_ptr<simulation::SimulationService> service;
   std::unique_ptr<rpc::Server> server;
   if (!options.listen.empty()) {
@@ -81,6 +88,7 @@ int main(int argc, char** argv) {
   listen->needs(store);
   lease::LeaseFlags flags;
   flags.AddTo(app, options.lease, "Simulations at once, from each side");
+  options.telemetry.AddTo(app);
   CLI::App* execute_task = app.add_subcommand("execute-task", "Runs one task given on standard input; the program starts this itself");
   CLI::App* try_effect = app.add_subcommand("try", "Runs one effect on a tracked.h5 at once, without a scheduler");
   simulation::TryOptions trial;

@@ -132,11 +132,12 @@ std::map<std::string, int> FinishedTasks(const fs::path& state) {
   for (const auto& entry : fs::directory_iterator(state / "logs")) {
     std::ifstream log(entry.path());
     for (std::string line; std::getline(log, line);) {
-      // "worker NAME: LABEL: done in 1.23 s"
-      const std::size_t end = line.find(": done in ");
-      const std::size_t start = line.find(": ");
-      if (end == std::string::npos || start >= end) continue;
-      ++finished[line.substr(start + 2, end - start - 2)];
+      // "TIME info attempt done: task="LABEL" attempt=12 …"
+      constexpr std::string_view kDone = "attempt done: task=\"";
+      const std::size_t start = line.find(kDone);
+      if (start == std::string::npos) continue;
+      const std::size_t label = start + kDone.size();
+      ++finished[line.substr(label, line.find('"', label) - label)];
     }
   }
   return finished;

@@ -21,6 +21,7 @@ struct Writer {
   void operator()(const core::RunEnded& ended) const { store.runs.erase(ended.key); }
   void operator()(const core::AttemptsReserved& reserved) const { store.attempt_next = reserved.next; }
   void operator()(const core::JobCancelled& cancelled) const { Job(cancelled.job).cancelled = true; }
+  void operator()(const core::AttemptEnded&) const {}
   void operator()(const core::JobRetried& retried) const {
     Job(retried.job).cancelled = false;
     Job(retried.job).failures.clear();

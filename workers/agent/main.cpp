@@ -11,6 +11,8 @@
 #include "services/base/processor.h"
 #include "services/lease/lease_flags.h"
 #include "services/lease/lease_loop.h"
+#include "services/lease/lease_metrics.h"
+#include "services/telemetry/telemetry_flags.h"
 #include "workers/agent/executors.h"
 
 namespace {
@@ -33,6 +35,8 @@ int main(int argc, char** argv) {
       ->envname("VOROCAST_SCHEDULER");
   lease::LeaseFlags flags;
   flags.AddTo(app, options, "Tasks at once");
+  telemetry::TelemetryFlags telemetry_flags;
+  telemetry_flags.AddTo(app);
   CLI::App* execute_task = app.add_subcommand("execute-task", "Runs one task given on standard input; the worker starts this itself");
   CLI11_PARSE(app, argc, argv);
 
@@ -40,10 +44,15 @@ int main(int argc, char** argv) {
   if (execute_task->parsed()) return lease::ExecuteTaskMain(executors);
 
   flags.Apply(options);
+  absl::Status status = telemetry_flags.StartLog("worker");
+  lease::LeaseMetrics metrics("worker", options.slots);
+  const auto metrics_server = telemetry_flags.StartMetrics(metrics.registry());
+  status.Update(metrics_server.status());
+  options.metrics = &metrics;
   std::vector<tasks::Kind> kinds;
   for (const auto& executor : executors) kinds.push_back(executor->kind());
   lease::LeaseLoopSummary summary;
-  const absl::Status status = lease::RunLeaseLoop(options, kinds, &summary);
+  if (status.ok()) status = lease::RunLeaseLoop(options, kinds, &summary);
   if (summary.told_to_stop && summary.given_back > 0) return lease::kWorkLeft;
   if (status.ok()) return EXIT_SUCCESS;
   fmt::print(stderr, "vorocast-worker: {}\n", std::string(status.message()));

@@ -103,8 +103,10 @@ v1::Finished FakeWorker::Execute(const v1::Lease& lease) {
   v1::Finished finished;
   *finished.mutable_id() = lease.id();
   if (const std::string cause = behaviour_.fails(lease.label()); !cause.empty()) {
-    finished.mutable_failed()->set_cause(v1::Failed::INPUT);
+    finished.mutable_failed()->set_cause(cause == "CRASHED" ? v1::Failed::CRASHED : v1::Failed::INPUT);
     finished.mutable_failed()->set_message(cause);
+    finished.mutable_failed()->set_memory_peak(7 << 20);
+    finished.set_log("what " + lease.label() + " printed");
     return finished;
   }
   const auto spec = tasks::TaskSpecFromJson(nlohmann::json::parse(lease.spec_json(), nullptr, false));

@@ -20,7 +20,7 @@ class FakeWorker {
   struct Behaviour {
     std::string name = "fake-1";
     std::int32_t slots = 4;
-    /// A cause to fail with, or empty to succeed; by label.
+    /// What to fail with, or empty to succeed; by label. "CRASHED" is tried again, everything else is the input's fault.
     std::function<std::string(const std::string& label)> fails = [](const std::string&) { return std::string(); };
     /// Keeps an attempt instead of finishing it.
     std::function<bool(const std::string& label)> holds = [](const std::string&) { return false; };

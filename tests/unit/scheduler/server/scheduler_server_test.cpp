@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -157,6 +158,19 @@ class SchedulerServerTest : public testing::Test {
     while (stream->Read(&chunk)) bytes += chunk.data();
     RETURN_IF_ERROR(rpc::FromGrpc(stream->Finish()));
     return bytes;
+  }
+  absl::StatusOr<std::vector<v1::TaskAttempt>> Attempts(const std::string& job, const std::string& task = "") {
+    grpc::ClientContext context;
+    v1::AttemptsRequest request;
+    request.set_job_id(job);
+    request.set_task(task);
+    request.set_logs(true);
+    const auto stream = jobs_->Attempts(&context, request);
+    std::vector<v1::TaskAttempt> attempts;
+    v1::AttemptsReply reply;
+    while (stream->Read(&reply)) attempts.insert(attempts.end(), reply.attempts().begin(), reply.attempts().end());
+    RETURN_IF_ERROR(rpc::FromGrpc(stream->Finish()));
+    return attempts;
   }
   /// Polls until `holds` or half a minute has gone.
   static bool Await(const std::function<bool()>& holds) {
@@ -416,6 +430,81 @@ TEST_F(SchedulerServerTest, ATakeClosedEmptyFailsItsJob) {
   const auto ended = WatchToEnd(job->id());
   EXPECT_EQ(ended->state(), v1::FAILED);
   EXPECT_THAT(ended->failures(0).cause(), HasSubstr("without a frame"));
+}
+
+TEST_F(SchedulerServerTest, EachAttemptIsKeptWithItsLog) {
+  const double before = absl::ToDoubleSeconds(absl::Now() - absl::UnixEpoch());
+  const auto sequence = Open();
+  const auto job = Submit(sequence->id());
+  ASSERT_TRUE(AddFrames(sequence->id(), 0, 6).ok() && Close(sequence->id()).ok());
+  std::atomic<int> crashes = 0;
+  StartWorker({.fails = [&](const std::string& label) -> std::string {
+                 if (label == "frame 2: tessellate") return "INPUT";
+                 // The second attempt succeeds.
+                 return label == "template" && crashes++ == 0 ? "CRASHED" : "";
+               },
+               .holds = [](const std::string& label) { return label == "assemble"; }});
+  ASSERT_TRUE(Await([&] { return Attempts(job->id(), "assemble").value_or(std::vector<v1::TaskAttempt>{}).size() == 1; }));
+  const auto at_work = Attempts(job->id());
+  ASSERT_TRUE(at_work.ok()) << at_work.status();
+  EXPECT_EQ(at_work->back().task(), "assemble");
+  EXPECT_EQ(at_work->back().outcome(), v1::RUNNING);
+  EXPECT_EQ(at_work->back().ended(), 0);
+  worker_->Release();
+  ASSERT_EQ(WatchToEnd(job->id())->state(), v1::DONE);
+
+  const auto check = [&] {
+    const auto attempts = Attempts(job->id());
+    ASSERT_TRUE(attempts.ok()) << attempts.status();
+    const double now = absl::ToDoubleSeconds(absl::Now() - absl::UnixEpoch());
+    std::map<std::string, int> times;
+    double last = 0;
+    for (const v1::TaskAttempt& attempt : *attempts) {
+      ++times[attempt.task()];
+      EXPECT_EQ(attempt.worker(), "fake-1");
+      EXPECT_LE(before, attempt.started());
+      EXPECT_LE(attempt.started(), attempt.ended());
+      EXPECT_LE(last, attempt.ended());
+      EXPECT_LE(attempt.ended(), now);
+      last = attempt.ended();
+      const bool bad = attempt.task() == "frame 2: tessellate" || (attempt.task() == "template" && times["template"] == 1);
+      EXPECT_EQ(attempt.outcome(), bad ? v1::FAILED : v1::DONE) << attempt.task();
+      EXPECT_EQ(attempt.log(), bad ? "what " + attempt.task() + " printed" : "");
+      EXPECT_EQ(attempt.cause().empty(), !bad);
+      EXPECT_EQ(attempt.memory_peak(), bad ? 7 << 20 : 0);
+    }
+    EXPECT_EQ(times, worker_->executed());
+    EXPECT_EQ(times["template"], 2);
+    const auto one = Attempts(job->id(), job->id() + "/template");
+    ASSERT_TRUE(one.ok() && one->size() == 2);
+    EXPECT_THAT(one->front().cause(), HasSubstr("CRASHED"));
+  };
+  check();
+  server_.reset();
+  StartScheduler();
+  check();
+  EXPECT_THAT(Explain(job->id(), "template"), HasSubstr("1 attempts before it failed"));
+  EXPECT_THAT(Explain(job->id(), "guide"), HasSubstr("done"));
+  EXPECT_THAT(Explain(job->id(), "no such task"), HasSubstr("no attempt"));
+  EXPECT_EQ(Attempts("j99").status().code(), absl::StatusCode::kNotFound);
+}
+
+TEST_F(SchedulerServerTest, CapturedFramesCanBeFetched) {
+  const auto sequence = Open();
+  const auto job = Submit(sequence->id());
+  ASSERT_TRUE(AddFrames(sequence->id(), 0, 3).ok());
+  EXPECT_EQ(*Fetch(job->id(), "capture/frame_000002.ply"), Bytes(2));
+  for (const char* name : {"capture/frame_000003.ply", "capture/frame_000002.obj", "capture/frame_000002", "capture/frame_.ply",
+                           "capture/frame_-00002.ply", "capture/../frame_000002.ply", "capture/frame_99999999999999.ply"}) {
+    EXPECT_EQ(Fetch(job->id(), name).status().code(), absl::StatusCode::kNotFound) << name;
+  }
+  // Also once nobody needs the frames any more.
+  StartWorker();
+  ASSERT_TRUE(Close(sequence->id()).ok());
+  ASSERT_EQ(WatchToEnd(job->id())->state(), v1::DONE);
+  server_.reset();
+  StartScheduler();
+  EXPECT_EQ(*Fetch(job->id(), "capture/frame_000001.ply"), Bytes(1));
 }
 
 }  // namespace

@@ -63,6 +63,7 @@ TEST_F(SqliteStoreTest, EachCommitSurvivesAKill) {
 TEST_F(SqliteStoreTest, TakesOverADatabaseFromBeforeTerms) {
   Lead()->Append(Take()).IgnoreError();
   auto connection = SqliteConnection::Open(path_);
+  ASSERT_TRUE(connection->Execute("DROP TABLE attempt; DROP TABLE attempt_log").ok());
   ASSERT_TRUE(connection->Execute("DROP TABLE ended_job; DROP TABLE migration; DELETE FROM meta WHERE name = 'term'; PRAGMA user_version = 1").ok());
   for (const char* column : {"submitted", "paused", "workers_max", "deadline", "memory_limit", "time_factor"}) {
     ASSERT_TRUE(connection->Execute(fmt::format("ALTER TABLE job DROP COLUMN {}", column)).ok());

@@ -346,5 +346,98 @@ TEST(PostgresStore, NamesTheLeaderAndTakesNoPasswordInTheUrl) {
   EXPECT_THAT(std::string(secret.status().message()), testing::AllOf(HasSubstr(".pgpass"), testing::Not(HasSubstr("hunter2"))));
 }
 
+core::AttemptEnded Attempt(const std::string& job, std::int64_t number, const std::string& task, int second) {
+  return {.job = job,
+          .task = task,
+          .kind = tasks::Kind::kTrack,
+          .attempt = number,
+          .worker = "worker \"7\", {é}",
+          .lasted = absl::Milliseconds(1500),
+          .ended = absl::FromUnixSeconds(1'800'000'000 + second),
+          .outcome = core::AttemptEnded::Outcome::kFailed,
+          .cause = core::Cause::kCrashed,
+          .message = "killed by {\"SIGSEGV\"} \\",
+          .cpu_seconds = 0.75,
+          .memory_peak = std::int64_t{5} << 30,
+          .log = "last words\n\"{}\\ é"};
+}
+std::vector<std::int64_t> Numbers(Store& store, const AttemptQuery& query) {
+  const auto attempts = store.FindAttempts(query);
+  EXPECT_TRUE(attempts.ok()) << attempts.status();
+  std::vector<std::int64_t> numbers;
+  if (attempts.ok())
+    for (const core::AttemptEnded& attempt : *attempts) numbers.push_back(attempt.attempt);
+  return numbers;
+}
+
+TEST_P(StoreTest, KeepsEachAttemptWithWhatItPrinted) {
+  core::AttemptEnded attempt = Attempt("j1", 12, "frame 2: tessellate", 3);
+  attempt.log += std::string("\0\xff", 2);
+  {
+    const auto store = Lead();
+    for (int twice = 0; twice < 2; ++twice) {
+      const absl::Status status = store->Append({core::Record(attempt)});
+      ASSERT_TRUE(status.ok()) << status;
+    }
+  }
+  const auto store = Lead();
+  const auto found = store->FindAttempts({.job = "j1", .logs = true});
+  ASSERT_TRUE(found.ok()) << found.status();
+  ASSERT_EQ(found->size(), 1u);
+  const core::AttemptEnded& kept = found->front();
+  EXPECT_EQ(kept.job, "j1");
+  EXPECT_EQ(kept.task, "frame 2: tessellate");
+  EXPECT_EQ(kept.kind, tasks::Kind::kTrack);
+  EXPECT_EQ(kept.attempt, 12);
+  EXPECT_EQ(kept.worker, attempt.worker);
+  EXPECT_EQ(kept.lasted, absl::Milliseconds(1500));
+  EXPECT_EQ(kept.ended, attempt.ended);
+  EXPECT_EQ(kept.outcome, core::AttemptEnded::Outcome::kFailed);
+  EXPECT_EQ(kept.cause, core::Cause::kCrashed);
+  EXPECT_EQ(kept.message, attempt.message);
+  EXPECT_EQ(kept.cpu_seconds, 0.75);
+  EXPECT_EQ(kept.memory_peak, std::int64_t{5} << 30);
+  EXPECT_EQ(kept.log, attempt.log);
+  EXPECT_EQ(store->FindAttempts({.job = "j1"})->front().log, "");
+}
+
+TEST_P(StoreTest, GivesAttemptsInTheOrderTheyEndedPortionByPortion) {
+  const auto store = Lead();
+  // One attempt that two tasks of a job waited for, and others' attempts among them.
+  ASSERT_TRUE(store
+                  ->Append({core::Record(Attempt("j1", 5, "b", 9)), core::Record(Attempt("j1", 9, "a", 2)), core::Record(Attempt("j2", 4, "a", 4)),
+                            core::Record(Attempt("j1", 7, "b", 5)), core::Record(Attempt("j1", 7, "a", 5)), core::Record(Attempt("j1", 6, "c", 5))})
+                  .ok());
+  EXPECT_THAT(Numbers(*store, {.job = "j1"}), testing::ElementsAre(9, 6, 7, 7, 5));
+  EXPECT_THAT(Numbers(*store, {.job = "j1", .task = "b"}), testing::ElementsAre(7, 5));
+  EXPECT_THAT(Numbers(*store, {.job = "j3"}), testing::ElementsAre());
+  std::vector<std::int64_t> together;
+  AttemptQuery query{.job = "j1", .logs = true, .count_max = 2};
+  for (int portion = 0; portion < 4; ++portion) {
+    const auto attempts = store->FindAttempts(query);
+    ASSERT_TRUE(attempts.ok()) << attempts.status();
+    for (const core::AttemptEnded& attempt : *attempts) together.push_back(attempt.attempt);
+    if (!attempts->empty()) query.after = attempts->back();
+  }
+  EXPECT_THAT(together, testing::ElementsAre(9, 6, 7, 7, 5));
+}
+
+TEST_P(StoreTest, ForgetsOldAttemptsOfEndedJobsOnly) {
+  const auto store = Lead();
+  ASSERT_TRUE(store->Append(Take()).ok());
+  ASSERT_TRUE(store
+                  ->Append({JobAdded{"j2", "s1", "anna", 0, "{}"}, JobEnded{"j1", "s", "w"}, core::Record(Attempt("j1", 1, "a", 1)),
+                            core::Record(Attempt("j1", 2, "a", 2)), core::Record(Attempt("j1", 3, "a", 3)), core::Record(Attempt("j2", 4, "a", 1))})
+                  .ok());
+  const absl::Time before = absl::FromUnixSeconds(1'800'000'003);
+  const absl::Status status = store->Append({AttemptsForgotten{before, 1}});
+  ASSERT_TRUE(status.ok()) << status;
+  EXPECT_THAT(Numbers(*store, {.job = "j1"}), testing::ElementsAre(2, 3));
+  ASSERT_TRUE(store->Append({AttemptsForgotten{before, 10}}).ok());
+  EXPECT_THAT(Numbers(*store, {.job = "j1"}), testing::ElementsAre(3));
+  EXPECT_THAT(Numbers(*store, {.job = "j2"}), testing::ElementsAre(4));
+  EXPECT_EQ(store->FindAttempts({.job = "j1", .logs = true})->front().log, Attempt("j1", 3, "a", 3).log);
+}
+
 }  // namespace
 }  // namespace vorocast::store

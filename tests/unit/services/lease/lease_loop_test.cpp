@@ -194,6 +194,19 @@ TEST_F(LeaseLoopTest, ATaskThatTakesTooLongIsStopped) {
   EXPECT_TRUE(NoTemporariesLeft());
 }
 
+TEST_F(LeaseLoopTest, WhatAnAttemptPrintedGoesAlong) {
+  StartWorker();
+  const v1::Finished silent = RunToEnd(LeaseOf({{"do", "write"}}));
+  EXPECT_EQ(silent.log(), "");
+  const v1::Finished crash = RunToEnd(LeaseOf({{"do", "crash"}}));
+  EXPECT_THAT(crash.log(), HasSubstr("the last words"));
+  EXPECT_GT(crash.failed().memory_peak(), 1 << 20);
+  const v1::Finished much = RunToEnd(LeaseOf({{"do", "print a lot"}}));
+  EXPECT_LE(much.log().size(), std::size_t{64} << 10);
+  EXPECT_GT(much.log().size(), std::size_t{60} << 10);
+  EXPECT_TRUE(much.log().ends_with("line 99999\n\uFFFD the last words")) << much.log().substr(much.log().size() - 100);
+}
+
 TEST_F(LeaseLoopTest, HeartbeatsCarryProgress) {
   StartWorker();
   const std::string pipe = MakePipe("pipe");

@@ -35,6 +35,11 @@ class ObedientExecutor : public Executor {
       std::printf("{\"code\": 13, \"message\": \"a library that prints\"}\n");
       std::fflush(stdout);
     }
+    if (what == "print a lot") {
+      for (int line = 0; line < 100'000; ++line) std::fprintf(stderr, "line %d\n", line);
+      std::fprintf(stderr, "\xff the last words\n");
+      return absl::InvalidArgumentError("it was too much");
+    }
     if (what == "crash") {
       std::fprintf(stderr, "the last words\n");
       ::raise(SIGSEGV);
