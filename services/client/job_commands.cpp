@@ -16,6 +16,7 @@
 #include "services/client/job_view.h"
 #include "services/client/percent_view.h"
 #include "services/client/run_job.h"
+#include "services/client/send_take.h"
 
 namespace vorocast::client {
 namespace {
@@ -45,6 +46,7 @@ void AddSubmit(CLI::App& program, int& exit_code) {
     CaptureFlags capture;
     JobFlags job;
     SchedulerFlags scheduler;
+    FollowOptions follow;
     bool watch = false;
   };
   auto flags = std::make_shared<Flags>();
@@ -55,22 +57,24 @@ void AddSubmit(CLI::App& program, int& exit_code) {
   flags->job.AddTo(command);
   flags->scheduler.AddTo(command);
   command.add_flag("--watch", flags->watch, "Stay and show the job as it goes on");
-  command.footer("What the scheduler has already is not sent again: after a break, the same command goes on.");
+  command.add_flag("--follow", flags->follow.follow, "Send the frames while the capture writes them; they are worked on as they arrive");
+  command
+      .add_option("--idle", flags->follow.idle,
+                  "With --follow: seconds without a write after which the take is over; 0: only capture.done ends it (60)")
+      ->check(CLI::Range(0, 86400));
+  command.add_option("--settle", flags->follow.settle, "With --follow: milliseconds without a write after which a file is whole (1000)")
+      ->check(CLI::Range(10, 600000));
+  command.footer(
+      "What the scheduler has already is not sent again: after a break, the same command goes on.\n"
+      "Frames get their numbers by the order of their file names. A scheduler that is away is waited for.\n"
+      "Example: vorocast submit /capture/take7 --to farm:7400 --session 2026-05-02 --units mm --effect melt --follow");
   command.callback([flags, &exit_code] {
     const auto submit = [&]() -> absl::Status {
       ASSIGN_OR_RETURN(const capture::CaptureOptions options, flags->capture.Parse());
-      ASSIGN_OR_RETURN(v1::SubmitJobRequest request, flags->job.Parse());
-      ASSIGN_OR_RETURN(const capture::Capture capture, capture::OpenCapture(flags->folder, options));
-      RETURN_IF_ERROR(CheckCapture(capture));
+      ASSIGN_OR_RETURN(const v1::SubmitJobRequest request, flags->job.Parse());
       ASSIGN_OR_RETURN(SchedulerClient client, flags->scheduler.Connect());
       CatchInterrupts();
-      PercentView view("Frames");
-      ASSIGN_OR_RETURN(const v1::Sequence sequence, client.Upload(
-                                                        capture, flags->session, [&](double fraction) { view.Show(fraction); }, Interrupted));
-      view.Finish();
-      request.set_sequence_id(sequence.id());
-      ASSIGN_OR_RETURN(const v1::Job job, client.Submit(request));
-      fmt::print("Job {}\n", job.id());
+      ASSIGN_OR_RETURN(const v1::Job job, SendTake(client, flags->folder, options, flags->session, request, flags->follow));
       if (!flags->watch) return absl::OkStatus();
       return FollowToItsEnd(client, job.id());
     };

@@ -34,6 +34,18 @@ std::string LowerCaseExtension(const std::filesystem::path& path) {
   return extension;
 }
 
+absl::StatusOr<v1::Blob> BlobOf(const std::filesystem::path& path) {
+  ASSIGN_OR_RETURN(const base::Digest digest, base::HashFile(path));
+  std::error_code error;
+  const auto size = std::filesystem::file_size(path, error);
+  if (error) return absl::NotFoundError(fmt::format("{}: {}", path.string(), error.message()));
+  v1::Blob blob;
+  blob.set_sha256(digest.Hex());
+  blob.set_extension(LowerCaseExtension(path));
+  blob.set_size(static_cast<std::int64_t>(size));
+  return blob;
+}
+
 /// Sends one blob's bytes.
 absl::Status UploadOnce(v1::Captures::Stub& captures, const v1::Blob& blob, const std::filesystem::path& path) {
   std::ifstream file(path, std::ios::binary);
@@ -94,36 +106,39 @@ absl::StatusOr<Reply> SchedulerClient::Call(std::unique_ptr<Service> Scheduler::
 
 absl::StatusOr<v1::Sequence> SchedulerClient::Upload(const capture::Capture& capture, const std::string& session, const base::Progress& progress,
                                                      const std::function<bool()>& interrupted) {
-  std::vector<v1::Blob> blobs;
-  for (const capture::CaptureFrame& frame : capture.frames) {
-    if (interrupted()) return absl::CancelledError("stopped; the same command goes on from here");
-    ASSIGN_OR_RETURN(const base::Digest digest, base::HashFile(frame.path));
-    v1::Blob& blob = blobs.emplace_back();
-    blob.set_sha256(digest.Hex());
-    blob.set_extension(LowerCaseExtension(frame.path));
-    std::error_code error;
-    blob.set_size(static_cast<std::int64_t>(std::filesystem::file_size(frame.path, error)));
-    if (error) return absl::NotFoundError(fmt::format("{}: {}", frame.path.string(), error.message()));
-    base::Report(progress, 0.3 * static_cast<double>(blobs.size()) / static_cast<double>(capture.frames.size()));
-  }
+  ASSIGN_OR_RETURN(const v1::Sequence sequence, OpenSequence(capture, session));
+  RETURN_IF_ERROR(SendFrames(sequence.id(), capture.frames, progress, interrupted).status());
+  return CloseSequence(sequence.id());
+}
 
+absl::StatusOr<v1::Sequence> SchedulerClient::OpenSequence(const capture::Capture& capture, const std::string& session) {
   v1::OpenSequenceRequest open;
   open.set_session(session);
   open.set_name(capture.name);
   open.set_frames_per_second(capture.frames_per_second);
   open.set_metres_per_unit(capture.metres_per_unit);
   open.set_up(capture.up);
-  ASSIGN_OR_RETURN(v1::Sequence sequence, Call(&Scheduler::captures, &v1::Captures::Stub::Open, open));
+  return Call(&Scheduler::captures, &v1::Captures::Stub::Open, open);
+}
 
+absl::StatusOr<v1::Sequence> SchedulerClient::SendFrames(const std::string& sequence_id, const std::vector<capture::CaptureFrame>& frames,
+                                                         const base::Progress& progress, const std::function<bool()>& interrupted) {
+  std::vector<v1::Blob> blobs;
+  for (const capture::CaptureFrame& frame : frames) {
+    if (interrupted()) return absl::CancelledError("stopped; the same command goes on from here");
+    ASSIGN_OR_RETURN(blobs.emplace_back(), BlobOf(frame.path));
+    base::Report(progress, 0.3 * static_cast<double>(blobs.size()) / static_cast<double>(frames.size()));
+  }
+  v1::Sequence sequence;
   for (std::size_t first = 0; first < blobs.size(); first += kFramesPerCall) {
     const std::size_t last = std::min(blobs.size(), first + kFramesPerCall);
     v1::MissingRequest ask;
     v1::AddFramesRequest add;
-    add.set_sequence_id(sequence.id());
+    add.set_sequence_id(sequence_id);
     for (std::size_t i = first; i < last; ++i) {
       *ask.add_blobs() = blobs[i];
       v1::Frame& frame = *add.add_frames();
-      frame.set_number(capture.frames[i].number);
+      frame.set_number(frames[i].number);
       *frame.mutable_blob() = blobs[i];
     }
     ASSIGN_OR_RETURN(const v1::MissingReply missing, Call(&Scheduler::captures, &v1::Captures::Stub::Missing, ask));
@@ -131,14 +146,17 @@ absl::StatusOr<v1::Sequence> SchedulerClient::Upload(const capture::Capture& cap
     for (const v1::Blob& blob : missing.blobs()) wanted.insert(blob.sha256() + blob.extension());
     for (std::size_t i = first; i < last; ++i) {
       if (interrupted()) return absl::CancelledError("stopped; the same command goes on from here");
-      if (wanted.erase(blobs[i].sha256() + blobs[i].extension()) > 0) RETURN_IF_ERROR(UploadBlob(blobs[i], capture.frames[i].path));
+      if (wanted.erase(blobs[i].sha256() + blobs[i].extension()) > 0) RETURN_IF_ERROR(UploadBlob(blobs[i], frames[i].path));
       base::Report(progress, 0.3 + 0.7 * static_cast<double>(i + 1) / static_cast<double>(blobs.size()));
     }
     ASSIGN_OR_RETURN(sequence, Call(&Scheduler::captures, &v1::Captures::Stub::Add, add));
   }
+  return sequence;
+}
 
+absl::StatusOr<v1::Sequence> SchedulerClient::CloseSequence(const std::string& sequence_id) {
   v1::CloseSequenceRequest close;
-  close.set_sequence_id(sequence.id());
+  close.set_sequence_id(sequence_id);
   return Call(&Scheduler::captures, &v1::Captures::Stub::Close, close);
 }
 

@@ -24,10 +24,16 @@ class SchedulerClient {
 
   const std::string& address() const { return address_; }
 
-  /// Opens the capture's sequence, sends what the store does not have yet, adds all frames and closes it. May be repeated. Asks
-  /// `interrupted` before every frame and ends with CANCELLED once that says true.
+  /// Opens the capture's sequence, sends all its frames and closes it. May be repeated.
   absl::StatusOr<v1::Sequence> Upload(const capture::Capture& capture, const std::string& session, const base::Progress& progress,
                                       const std::function<bool()>& interrupted);
+  /// The sequence that the capture's session and name stand for, as it is; new if there is none.
+  absl::StatusOr<v1::Sequence> OpenSequence(const capture::Capture& capture, const std::string& session);
+  /// Sends what the store does not have yet of these frames, and adds them. May be repeated. Asks `interrupted` before every frame and ends with
+  /// CANCELLED once that says true.
+  absl::StatusOr<v1::Sequence> SendFrames(const std::string& sequence_id, const std::vector<capture::CaptureFrame>& frames,
+                                          const base::Progress& progress, const std::function<bool()>& interrupted);
+  absl::StatusOr<v1::Sequence> CloseSequence(const std::string& sequence_id);
 
   absl::StatusOr<v1::Job> Submit(const v1::SubmitJobRequest& request);
   absl::StatusOr<v1::Job> Get(const std::string& job_id);
