@@ -81,17 +81,20 @@ void Running::Signal(int signal_number) const {
   if (pid_ > 0) kill(pid_, signal_number);
 }
 
+bool Running::HasEnded() {
+  if (pid_ > 0 && waitpid(pid_, &status_, WNOHANG) == pid_) pid_ = -1;
+  return pid_ <= 0;
+}
+
 Outcome Running::Wait() {
-  int status = 0;
-  const bool ended = Eventually([&] { return waitpid(pid_, &status, WNOHANG) == pid_; }, kWaitSeconds);
+  const bool ended = Eventually([&] { return HasEnded(); }, kWaitSeconds);
   Outcome outcome;
   outcome.output = ReadText(log_);
   if (!ended) {
     ADD_FAILURE() << "still running after five minutes:\n" << outcome.output;
     return outcome;
   }
-  pid_ = -1;
-  if (WIFEXITED(status)) outcome.exit_code = WEXITSTATUS(status);
+  if (WIFEXITED(status_)) outcome.exit_code = WEXITSTATUS(status_);
   return outcome;
 }
 

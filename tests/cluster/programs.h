@@ -26,11 +26,14 @@ class Running {
 
   void Signal(int signal_number) const;
   pid_t pid() const { return pid_; }
+  /// Without waiting.
+  bool HasEnded();
   /// Waits for its end, at most five minutes.
   Outcome Wait();
 
  private:
-  pid_t pid_ = -1;
+  pid_t pid_ = -1;  // −1: has ended
+  int status_ = 0;  // then, as waitpid gives it
   std::filesystem::path log_;
 };
 

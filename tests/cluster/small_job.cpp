@@ -17,16 +17,16 @@ const std::filesystem::path& SmallCapture() {
   return folder;
 }
 
+std::vector<std::string> SmallJobFlags(const std::string& effect) {
+  return {"--cells", "400", "--patches", "30", "--template", "0", "--no-sheets", "--effect", effect};
+}
+
 std::vector<std::string> RunArguments(const std::filesystem::path& folder, const std::string& effect) {
-  return {"run",         SmallCapture().string(),
-          "--out",       (folder / "out").string(),
-          "--state",     (folder / "state").string(),
-          "--workers",   "2",
-          "--cells",     "400",
-          "--patches",   "30",
-          "--template",  "0",
-          "--no-sheets", "--effect",
-          effect};
+  std::vector<std::string> arguments = {"run",     SmallCapture().string(),     "--out",     (folder / "out").string(),
+                                        "--state", (folder / "state").string(), "--workers", "2"};
+  const std::vector<std::string> job = SmallJobFlags(effect);
+  arguments.insert(arguments.end(), job.begin(), job.end());
+  return arguments;
 }
 
 const std::map<std::string, std::string>& UndisturbedDigests() {
