@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
+#include <memory>
 #include <string>
+#include <vector>
 
 namespace vorocast::fleet {
 
@@ -13,5 +15,8 @@ class Fleet {
   /// How it stands, in one sentence for people: the workers it has, and what is wrong if anything is. From any thread, at once.
   virtual std::string Describe() const = 0;
 };
+
+/// All of them, one after the other; empty if there is none.
+std::string Describe(const std::vector<std::unique_ptr<Fleet>>& fleets);
 
 }  // namespace vorocast::fleet

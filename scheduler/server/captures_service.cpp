@@ -105,7 +105,7 @@ grpc::ServerUnaryReactor* CapturesService::Missing(grpc::CallbackServerContext* 
 }
 
 grpc::ServerReadReactor<v1::UploadChunk>* CapturesService::Upload(grpc::CallbackServerContext*, v1::UploadReply*) {
-  return new UploadCall(artifacts_, disk_);
+  return new UploadCall(artifacts_, disk_, metrics_);
 }
 
 grpc::ServerUnaryReactor* CapturesService::Add(grpc::CallbackServerContext* context, const v1::AddFramesRequest* request, v1::Sequence* reply) {

@@ -5,6 +5,7 @@
 #include "scheduler/server/catalogue.h"
 #include "scheduler/server/disk_threads.h"
 #include "scheduler/server/engine.h"
+#include "scheduler/server/scheduler_metrics.h"
 #include "services/storage/artifact_store.h"
 
 namespace vorocast::server {
@@ -13,8 +14,8 @@ namespace vorocast::server {
 class CapturesService final : public v1::Captures::CallbackService {
  public:
   /// All must outlive the service.
-  CapturesService(Engine& engine, Catalogue& catalogue, const storage::ArtifactStore& artifacts, DiskThreads& disk)
-      : engine_(engine), catalogue_(catalogue), artifacts_(artifacts), disk_(disk) {}
+  CapturesService(Engine& engine, Catalogue& catalogue, const storage::ArtifactStore& artifacts, DiskThreads& disk, SchedulerMetrics& metrics)
+      : engine_(engine), catalogue_(catalogue), artifacts_(artifacts), disk_(disk), metrics_(metrics) {}
 
   grpc::ServerUnaryReactor* Open(grpc::CallbackServerContext* context, const v1::OpenSequenceRequest* request, v1::Sequence* reply) override;
   grpc::ServerUnaryReactor* Missing(grpc::CallbackServerContext* context, const v1::MissingRequest* request, v1::MissingReply* reply) override;
@@ -27,6 +28,7 @@ class CapturesService final : public v1::Captures::CallbackService {
   Catalogue& catalogue_;
   const storage::ArtifactStore& artifacts_;
   DiskThreads& disk_;
+  SchedulerMetrics& metrics_;
 };
 
 }  // namespace vorocast::server

@@ -108,6 +108,11 @@ void Engine::Enqueue(Command command) {
   wake_.notify_one();
 }
 
+std::size_t Engine::waiting() {
+  const std::lock_guard lock(mutex_);
+  return commands_.size() + asked_.size();
+}
+
 Command Engine::Next() {
   const std::lock_guard lock(mutex_);
   // In turn, so that neither keeps the other waiting for long.
@@ -174,8 +179,10 @@ absl::Status Engine::Commit(Turn& turn) {
   auto pause = kCommitPauseFirst;
   int last_attempts = 0;
   for (int attempt = 1;; ++attempt) {
+    const absl::Time begin = MonotonicNow();
     const absl::Status status = store_.Append(turn.records_);
     if (status.ok()) {
+      if (adapters_.committed) adapters_.committed(turn.records_, MonotonicNow() - begin);
       const std::lock_guard lock(mutex_);
       if (!stalled_.ok()) spdlog::info("commits go on: attempt={}", attempt);
       stalled_ = absl::OkStatus();

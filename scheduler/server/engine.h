@@ -53,6 +53,8 @@ struct EngineAdapters {
   std::function<void(std::vector<core::LookUp>)> look_up;
   /// Jobs that this turn's commands changed; called on every turn, also with none. What it changes itself belongs to the next turn's jobs.
   std::function<void(Turn&, const std::set<std::string>&)> changed;
+  /// These records have been made durable; called on the engine's thread.
+  std::function<void(const std::vector<store::Record>&, absl::Duration took)> committed;
   /// The store cannot be written for now; called on the engine's thread, once each time this begins.
   std::function<void(const absl::Status&)> stalled;
 };
@@ -80,6 +82,8 @@ class Engine {
   absl::Status Ask(Command command);
   /// For news that must not be lost however much is waiting, and whose number is bounded otherwise: an answered look-up, a stream's end.
   void Enqueue(Command command);
+  /// Commands that wait.
+  std::size_t waiting();
 
  private:
   void Run();

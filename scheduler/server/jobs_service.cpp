@@ -86,6 +86,7 @@ grpc::ServerUnaryReactor* JobsService::List(grpc::CallbackServerContext* context
   if (limit < 0 || limit > kListedMax) return Answer(context, absl::InvalidArgumentError(fmt::format("limit must be from 0 to {}", kListedMax)));
   return AnswerInTurn<v1::ListJobsReply>(context, engine_, reply,
                                          [this, limit, session = request->session()](Turn& turn, v1::ListJobsReply& list) -> absl::Status {
+                                           list.mutable_fleet()->set_description(fleet_.Text());
                                            const auto& order = catalogue_.job_order();
                                            for (auto id = order.rbegin(); id != order.rend() && list.jobs_size() < limit; ++id) {
                                              ASSIGN_OR_RETURN(const CatalogueJob* job, catalogue_.FindJob(*id));

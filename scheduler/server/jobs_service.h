@@ -9,6 +9,7 @@
 #include "scheduler/server/disk_threads.h"
 #include "scheduler/server/engine.h"
 #include "scheduler/server/fetch_call.h"
+#include "scheduler/server/fleet_note.h"
 #include "scheduler/server/watch_call.h"
 #include "services/storage/artifact_store.h"
 
@@ -18,8 +19,9 @@ namespace vorocast::server {
 class JobsService final : public v1::Jobs::CallbackService {
  public:
   /// All must outlive the service.
-  JobsService(Engine& engine, Catalogue& catalogue, Watchers& watchers, const storage::ArtifactStore& artifacts, DiskThreads& disk)
-      : engine_(engine), catalogue_(catalogue), watchers_(watchers), artifacts_(artifacts), disk_(disk) {}
+  JobsService(Engine& engine, Catalogue& catalogue, Watchers& watchers, const storage::ArtifactStore& artifacts, DiskThreads& disk,
+              const FleetNote& fleet)
+      : engine_(engine), catalogue_(catalogue), watchers_(watchers), artifacts_(artifacts), disk_(disk), fleet_(fleet) {}
 
   grpc::ServerUnaryReactor* Submit(grpc::CallbackServerContext* context, const v1::SubmitJobRequest* request, v1::Job* reply) override;
   grpc::ServerUnaryReactor* Get(grpc::CallbackServerContext* context, const v1::JobRequest* request, v1::Job* reply) override;
@@ -45,6 +47,7 @@ class JobsService final : public v1::Jobs::CallbackService {
   Watchers& watchers_;
   const storage::ArtifactStore& artifacts_;
   DiskThreads& disk_;
+  const FleetNote& fleet_;
 };
 
 }  // namespace vorocast::server

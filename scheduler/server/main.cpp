@@ -73,13 +73,16 @@ absl::Status Serve(const Options& options, const sigset_t& stop_signals) {
     if (!address) return absl::OkStatus();
     ASSIGN_OR_RETURN(server, SchedulerServer::Start({.state = state, .listen = *address}, std::move(store)));
   }
+  ASSIGN_OR_RETURN(const auto metrics, options.telemetry.StartMetrics(server->metrics()));
   ASSIGN_OR_RETURN(std::vector<std::unique_ptr<fleet::Fleet>> fleets,
                    options.fleet.Start(state, server->address(), [raw = server.get()] { return raw->Demand(); }));
   RETURN_IF_ERROR(Announce(state, server->address()));
+  server->DescribeFleet([&fleets] { return fleet::Describe(fleets); });
   spdlog::info("serving: address={} state={} pid={}", server->address(), state.string(), getpid());
   int signal = 0;
   sigwait(&stop_signals, &signal);
   spdlog::info("stopping: signal={}", signal);
+  server->DescribeFleet(nullptr);
   fleets.clear();
   server.reset();
   std::error_code ignored;

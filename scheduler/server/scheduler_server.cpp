@@ -12,9 +12,11 @@
 #include "scheduler/server/captures_service.h"
 #include "scheduler/server/demand.h"
 #include "scheduler/server/dispatch_service.h"
+#include "scheduler/server/fleet_note.h"
 #include "scheduler/server/jobs_service.h"
 #include "scheduler/server/leadership_watch.h"
 #include "scheduler/server/look_up_thread.h"
+#include "scheduler/server/scheduler_metrics.h"
 #include "scheduler/store/sqlite_store.h"
 #include "services/rpc/server.h"
 
@@ -44,14 +46,16 @@ struct SchedulerServer::Parts {
   std::unique_ptr<store::Store> store;
   /// From the start: a long queue is read before anything is written.
   LeadershipWatch leadership{*store, lost};
+  SchedulerMetrics metrics;
+  FleetNote fleet;
   storage::ArtifactStore artifacts;
   Engine engine{*store, lost};
   Catalogue catalogue{*store};
   Watchers watchers{catalogue};
   Archive archive{catalogue};
   std::unique_ptr<DiskThreads> disk = std::make_unique<DiskThreads>(kDiskThreads);
-  CapturesService captures{engine, catalogue, artifacts, *disk};
-  JobsService jobs{engine, catalogue, watchers, artifacts, *disk};
+  CapturesService captures{engine, catalogue, artifacts, *disk, metrics};
+  JobsService jobs{engine, catalogue, watchers, artifacts, *disk, fleet};
   DispatchService dispatch{engine, std::filesystem::absolute(artifacts.root()).lexically_normal().string()};
   std::unique_ptr<LookUpThread> look_ups;
   std::unique_ptr<rpc::Server> server;
@@ -83,8 +87,14 @@ void SchedulerServer::Parts::StartEngine() {
                       archive.NoteEnds(turn, changed);
                       watchers.Changed(turn, changed);
                       archive.Changed(turn, changed);
+                      metrics.Refresh(turn.state(), engine.waiting(), MonotonicNow());
                     },
-                .stalled = [this](const absl::Status& why) { watchers.EndAll(why); }});
+                .committed = [this](const std::vector<store::Record>& records, absl::Duration took) { metrics.Committed(records, took); },
+                .stalled =
+                    [this](const absl::Status& why) {
+                      metrics.Stalled();
+                      watchers.EndAll(why);
+                    }});
 }
 
 SchedulerServer::Parts::~Parts() {
@@ -101,6 +111,9 @@ SchedulerServer::Parts::~Parts() {
 
 SchedulerServer::SchedulerServer(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
 SchedulerServer::~SchedulerServer() = default;
+
+void SchedulerServer::DescribeFleet(std::function<std::string()> describe) { parts_->fleet.Set(std::move(describe)); }
+const std::shared_ptr<prometheus::Registry>& SchedulerServer::metrics() const { return parts_->metrics.registry(); }
 
 const std::string& SchedulerServer::address() const { return parts_->server->address(); }
 
@@ -124,6 +137,7 @@ absl::StatusOr<std::unique_ptr<SchedulerServer>> SchedulerServer::Start(const Sc
 absl::StatusOr<std::unique_ptr<SchedulerServer>> SchedulerServer::Start(const SchedulerOptions& options, std::unique_ptr<store::Store> store) {
   ASSIGN_OR_RETURN(storage::ArtifactStore artifacts, storage::ArtifactStore::Open(options.state));
   auto parts = std::make_unique<Parts>(std::move(store), std::move(artifacts), options.lost ? options.lost : EndProcess);
+  parts->metrics.SetTerm(parts->store->term());
   RETURN_IF_ERROR(parts->Restore());
   parts->StartEngine();
   ASSIGN_OR_RETURN(parts->server, rpc::StartServer({.listen = options.listen, .services = {&parts->captures, &parts->jobs, &parts->dispatch}}));

@@ -6,6 +6,8 @@
 #include <memory>
 #include <string>
 
+#include <prometheus/registry.h>
+
 #include "scheduler/fleet/sizing.h"
 #include "scheduler/store/store.h"
 #include "services/base/status.h"
@@ -36,6 +38,9 @@ class SchedulerServer {
   const std::string& address() const;
   /// What is left to do, for whoever provides workers. From any thread; UNAVAILABLE while the store cannot be written, or when it takes too long.
   absl::StatusOr<fleet::Demand> Demand() const;
+  /// How who lists jobs is told where workers come from; called from any thread. Nothing: nobody manages them.
+  void DescribeFleet(std::function<std::string()> describe);
+  const std::shared_ptr<prometheus::Registry>& metrics() const;
 
  private:
   struct Parts;

@@ -32,7 +32,10 @@ absl::StatusOr<base::Digest> CheckBlob(const v1::Blob& blob) {
   return digest;
 }
 
-UploadCall::UploadCall(const storage::ArtifactStore& artifacts, DiskThreads& disk) : artifacts_(artifacts), disk_(disk) { StartRead(&chunk_); }
+UploadCall::UploadCall(const storage::ArtifactStore& artifacts, DiskThreads& disk, SchedulerMetrics& metrics)
+    : artifacts_(artifacts), disk_(disk), metrics_(metrics) {
+  StartRead(&chunk_);
+}
 
 UploadCall::~UploadCall() {
   if (file_ >= 0) close(file_);
@@ -87,7 +90,9 @@ absl::Status UploadCall::Publish() {
   }
   close(file_);
   file_ = -1;
-  return artifacts_.PublishBlob(temporary_, digest_, blob_.extension());
+  RETURN_IF_ERROR(artifacts_.PublishBlob(temporary_, digest_, blob_.extension()));
+  metrics_.Uploaded(written_);
+  return absl::OkStatus();
 }
 
 }  // namespace vorocast::server

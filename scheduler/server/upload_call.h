@@ -8,6 +8,7 @@
 
 #include "proto/capture.pb.h"
 #include "scheduler/server/disk_threads.h"
+#include "scheduler/server/scheduler_metrics.h"
 #include "services/base/digest.h"
 #include "services/base/status.h"
 #include "services/storage/artifact_store.h"
@@ -20,7 +21,8 @@ absl::StatusOr<base::Digest> CheckBlob(const v1::Blob& blob);
 /// One blob on its way into the store. Owns itself until the call is over; a broken call leaves nothing behind.
 class UploadCall final : public grpc::ServerReadReactor<v1::UploadChunk> {
  public:
-  UploadCall(const storage::ArtifactStore& artifacts, DiskThreads& disk);
+  /// All must outlive the call.
+  UploadCall(const storage::ArtifactStore& artifacts, DiskThreads& disk, SchedulerMetrics& metrics);
   ~UploadCall() override;
 
   void OnReadDone(bool ok) override;
@@ -35,6 +37,7 @@ class UploadCall final : public grpc::ServerReadReactor<v1::UploadChunk> {
 
   const storage::ArtifactStore& artifacts_;
   DiskThreads& disk_;
+  SchedulerMetrics& metrics_;
   v1::UploadChunk chunk_;
   v1::Blob blob_;
   base::Digest digest_;

@@ -78,6 +78,7 @@ class PostgresStore final : public Store {
     term_ = term;
     return term;
   }
+  std::int64_t term() const override { return term_; }
   std::string LeaderAddress() override { return leadership_.LeaderAddress(); }
   absl::Status KeepLeading() override { return leadership_.Keep(); }
 

@@ -189,6 +189,7 @@ class SqliteStore final : public Store {
     return term_;
   }
 
+  std::int64_t term() const override { return term_; }
   /// Whoever is refused the lock is on the same machine and finds the address in the state folder.
   std::string LeaderAddress() override { return {}; }
 

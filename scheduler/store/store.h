@@ -104,6 +104,8 @@ class Store {
   /// Errors: FAILED_PRECONDITION names who leads now, or says that a newer version wrote this store; DATA_LOSS for a damaged one;
   /// UNAVAILABLE when it cannot be reached, RESOURCE_EXHAUSTED when its disk is full.
   virtual absl::StatusOr<std::int64_t> Lead(const std::string& address) = 0;
+  /// Under which it leads; 0 before it has led.
+  virtual std::int64_t term() const = 0;
   /// Where the present leader can be reached, as it said itself; empty if nobody knows.
   virtual std::string LeaderAddress() = 0;
   /// A leader's sign of life, about once a second, from one thread. FAILED_PRECONDITION: another leads now. UNAVAILABLE: not known.

@@ -10,6 +10,7 @@ void AddRunCommands(CLI::App& program, int& exit_code);      // run, demo
 void AddServiceCommands(CLI::App& program, int& exit_code);  // serve, worker
 void AddJobCommands(CLI::App& program, int& exit_code);      // submit, status, watch, explain, cancel, retry, fetch
 void AddLogCommands(CLI::App& program, int& exit_code);      // logs
+void AddReportCommand(CLI::App& program, int& exit_code);    // report
 void AddCaptureCommands(CLI::App& program, int& exit_code);  // inspect, synth
 void AddExportCommand(CLI::App& program, int& exit_code);    // export
 

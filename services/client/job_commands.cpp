@@ -10,6 +10,7 @@
 
 #include "services/client/commands.h"
 #include "services/client/embedded_service.h"
+#include "services/client/fleet_view.h"
 #include "services/client/interrupt.h"
 #include "services/client/job_choice.h"
 #include "services/client/job_flags.h"
@@ -94,9 +95,10 @@ void AddStatus(CLI::App& program, int& exit_code) {
         fmt::print("{}", DescribeJob(job));
         return absl::OkStatus();
       }
-      ASSIGN_OR_RETURN(const std::vector<v1::Job> jobs, client.List(50));
-      if (jobs.empty()) fmt::print("No jobs\n");
-      for (const v1::Job& job : jobs) fmt::print("{}  {:<24} {:<12} {}\n", job.id(), job.sequence_name(), job.user(), DescribeJobLine(job));
+      ASSIGN_OR_RETURN(const v1::ListJobsReply list, client.ListAll(50, ""));
+      fmt::print("{}", DescribeFleet(list.fleet(), absl::LocalTimeZone()));
+      if (list.jobs().empty()) fmt::print("No jobs\n");
+      for (const v1::Job& job : list.jobs()) fmt::print("{}  {:<24} {:<12} {}\n", job.id(), job.sequence_name(), job.user(), DescribeJobLine(job));
       return absl::OkStatus();
     };
     SetExitCode(exit_code, status());

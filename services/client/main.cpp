@@ -39,6 +39,7 @@ int main(int argc, char** argv) {
   vorocast::client::AddCaptureCommands(program, exit_code);
   vorocast::client::AddJobCommands(program, exit_code);
   vorocast::client::AddLogCommands(program, exit_code);
+  vorocast::client::AddReportCommand(program, exit_code);
   vorocast::client::AddExportCommand(program, exit_code);
   vorocast::client::AddServiceCommands(program, exit_code);
   try {

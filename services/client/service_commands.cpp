@@ -26,10 +26,16 @@ void AddServe(CLI::App& program, int& exit_code) {
   command.add_option("--workers", flags->workers, "Workers to start on this machine beside it, with one simulation; 0: none")
       ->capture_default_str()
       ->check(CLI::Range(0, 1024));
-  command.callback([flags, &exit_code] {
+  command.allow_extras();
+  command.footer(
+      "Further flags go to vorocast-scheduler as they are: where its workers come from (--fleet slurm, --workers-max 64), --metrics, --log-format,\n"
+      "what is kept for how long (--keep-days, --disk-limit). 'vorocast-scheduler --help' lists them.");
+  command.callback([flags, &command, &exit_code] {
     std::vector<std::string> arguments = {"--state", flags->state.empty() ? DefaultStateFolder().string() : flags->state, "--listen", flags->listen};
     if (!flags->database.empty()) arguments.insert(arguments.end(), {"--database", flags->database});
     if (flags->workers > 0) arguments.insert(arguments.end(), {"--workers", std::to_string(flags->workers), "--simulation"});
+    const std::vector<std::string> further = command.remaining();
+    arguments.insert(arguments.end(), further.begin(), further.end());
     exit_code = PrintError(BecomeProgram("vorocast-scheduler", arguments));
   });
 }

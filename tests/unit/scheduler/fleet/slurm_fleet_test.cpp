@@ -159,6 +159,29 @@ TEST_F(SlurmFleetTest, AsksForWorkersWithABoundedNumberInTheQueue) {
   EXPECT_TRUE(std::filesystem::exists(state_ / "slurm" / "worker.sh"));
 }
 
+TEST_F(SlurmFleetTest, AGrowingBacklogIsMetByFurtherArrays) {
+  // 300 s of work and twice as long to do it: one worker.
+  SetDemand({.kinds = {{.ready = 3, .seconds_mean = 100}}});
+  Start();
+  ASSERT_TRUE(Await([&] { return slurm_.size() == 1; }));
+  ASSERT_TRUE(AwaitRounds(5));
+  EXPECT_EQ(slurm_.size(), 1u);
+  slurm_.StartAll();
+  // A second take comes while the first is being worked on.
+  SetDemand({.kinds = {{.ready = 11, .running = 1, .seconds_mean = 100}}, .busy_workers = {"slurm-1_1-0"}});
+  ASSERT_TRUE(Await([&] { return slurm_.size() == 2; }));
+  slurm_.StartAll();
+  SetDemand({.kinds = {kMuchWork, {.ready = 11, .running = 2, .seconds_mean = 100}}, .busy_workers = {"slurm-1_1-0", "slurm-2_1-0"}});
+  ASSERT_TRUE(Await([&] { return slurm_.size() == 4; }));
+  ASSERT_TRUE(AwaitRounds(5));
+  EXPECT_EQ(slurm_.size(), 4u) << "more than --workers-max";
+  const auto arrays = slurm_.Commands("sbatch");
+  ASSERT_EQ(arrays.size(), 3u);
+  EXPECT_THAT(arrays[0], Contains("--array=1-1"));
+  EXPECT_THAT(arrays[1], Contains("--array=1-1"));
+  EXPECT_THAT(arrays[2], Contains("--array=1-2"));
+}
+
 TEST_F(SlurmFleetTest, DrainsOnlyIdleWorkersWhenTheWorkIsGone) {
   SetDemand({.kinds = {kMuchWork}});
   Start();

@@ -31,6 +31,7 @@ class FailingStore final : public store::Store {
     if (fails_.ok()) written += static_cast<int>(records.size());
     return fails_;
   }
+  std::int64_t term() const override { return 1; }
   absl::StatusOr<std::vector<core::AttemptEnded>> FindAttempts(const store::AttemptQuery&) override { return std::vector<core::AttemptEnded>{}; }
   absl::StatusOr<std::optional<core::Result>> FindResult(const base::Digest&) override { return std::nullopt; }
   absl::StatusOr<std::string> FindJobText(const std::string&, store::JobText) override { return absl::NotFoundError(""); }

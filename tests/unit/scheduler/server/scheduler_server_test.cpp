@@ -20,6 +20,8 @@
 #include "services/base/digest.h"
 #include "services/rpc/channel.h"
 #include "services/rpc/status.h"
+#include "services/telemetry/metrics_server.h"
+#include "tests/support/scrape.h"
 
 namespace vorocast::server {
 namespace {
@@ -505,6 +507,59 @@ TEST_F(SchedulerServerTest, CapturedFramesCanBeFetched) {
   server_.reset();
   StartScheduler();
   EXPECT_EQ(*Fetch(job->id(), "capture/frame_000001.ply"), Bytes(1));
+}
+
+TEST_F(SchedulerServerTest, MetricsEqualARecount) {
+  const auto metrics = telemetry::MetricsServer::Start("0", server_->metrics());
+  ASSERT_TRUE(metrics.ok()) << metrics.status();
+  const auto sequence = Open();
+  const auto job = Submit(sequence->id());
+  ASSERT_TRUE(AddFrames(sequence->id(), 0, 6).ok() && Close(sequence->id()).ok());
+  StartWorker({.slots = 3,
+               .fails = [](const std::string& label) { return std::string(label == "frame 2: tessellate" ? "INPUT" : ""); },
+               .holds = [](const std::string& label) { return label == "guide"; }});
+  ASSERT_TRUE(Await([&] { return support::Scrape((*metrics)->address()).at("vorocast_tasks{kind=\"guide\",phase=\"running\"}") == 1; }));
+  // The other tasks that were ready have ended meanwhile, or do so in a moment.
+  const auto equal = [&] {
+    const auto samples = support::Scrape((*metrics)->address());
+    const auto now = Get(job->id());
+    double done = 0;
+    for (const v1::Stage& stage : now->stages()) {
+      const auto of = [&](const char* phase) { return samples.at(fmt::format("vorocast_tasks{{kind=\"{}\",phase=\"{}\"}}", stage.kind(), phase)); };
+      if (of("done") != stage.done() || of("failed") != stage.failed() || of("running") != stage.running()) return false;
+      if (of("done") + of("failed") + of("running") + of("blocked") + of("ready") + of("cancelled") != stage.total()) return false;
+      const double seconds = samples.at(fmt::format("vorocast_task_seconds_count{{kind=\"{}\"}}", stage.kind()));
+      if (seconds != stage.done()) return false;
+      done += stage.done();
+    }
+    return samples.at("vorocast_attempts_total{cause=\"none\",outcome=\"done\"}") == done && samples.at("vorocast_busy_slots") == 1;
+  };
+  EXPECT_TRUE(Await(equal));
+  const auto samples = support::Scrape((*metrics)->address());
+  EXPECT_EQ(samples.at("vorocast_attempts_total{cause=\"bad_input\",outcome=\"failed\"}"), 1);
+  EXPECT_EQ(samples.at("vorocast_workers"), 1);
+  EXPECT_EQ(samples.at("vorocast_slots"), 3);
+  EXPECT_EQ(samples.at("vorocast_leader_term"), 1);
+  EXPECT_EQ(samples.at("vorocast_jobs{phase=\"running\"}"), 1);
+  double uploaded = 0;
+  for (int frame = 0; frame < 6; ++frame) uploaded += static_cast<double>(Bytes(frame).size());
+  EXPECT_EQ(samples.at("vorocast_upload_bytes_total"), uploaded);
+  double made = 0;
+  for (const auto& [label, times] : worker_->executed()) made += label == "frame 2: tessellate" ? 0 : static_cast<double>(label.size());
+  EXPECT_EQ(samples.at("vorocast_artifact_bytes_total"), made);
+  EXPECT_GT(samples.at("vorocast_commit_seconds_count"), 0);
+  // Values of other labels than these would be without bounds.
+  for (const auto& [name, value] : samples) EXPECT_EQ(name.find(job->id()), std::string::npos) << name;
+  worker_->Release();
+  ASSERT_EQ(WatchToEnd(job->id())->state(), v1::DONE);
+  EXPECT_TRUE(Await([&] { return support::Scrape((*metrics)->address()).at("vorocast_jobs{phase=\"running\"}") == 0; }));
+}
+
+TEST_F(SchedulerServerTest, TellsWhereWorkersComeFrom) {
+  server_->DescribeFleet([] { return std::string("Slurm: 3 workers up"); });
+  const auto list = Call<v1::Jobs::StubInterface>(*jobs_, &v1::Jobs::StubInterface::List, v1::ListJobsRequest());
+  ASSERT_TRUE(list.ok()) << list.status();
+  EXPECT_EQ(list->fleet().description(), "Slurm: 3 workers up");
 }
 
 }  // namespace

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "services/client/fleet_view.h"
+
 namespace vorocast::client {
 namespace {
 
@@ -33,6 +35,22 @@ TEST(AttemptView, FormatsBytes) {
   EXPECT_EQ(FormatBytes(999), "999 B");
   EXPECT_EQ(FormatBytes(1536), "1.5 KiB");
   EXPECT_EQ(FormatBytes(std::int64_t{2500} << 30), "2.4 TiB");
+}
+
+TEST(FleetView, SaysWhoWorks) {
+  v1::Fleet fleet;
+  EXPECT_EQ(DescribeFleet(fleet, absl::UTCTimeZone()), "No worker is connected\n");
+  fleet.set_description("Slurm: 3 workers up, 2 queued, at most 9");
+  fleet.set_workers(3);
+  fleet.set_slots(12);
+  fleet.set_busy(7);
+  v1::SetAside& aside = *fleet.add_set_aside();
+  aside.set_worker("farm-\x1b[2J");
+  aside.set_reason("5 tasks crashed");
+  aside.set_until(3661);
+  EXPECT_EQ(DescribeFleet(fleet, absl::UTCTimeZone()),
+            "3 workers connected, 7 of 12 slots busy (Slurm: 3 workers up, 2 queued, at most 9)\n"
+            "  set aside until 01:01:01: farm-·[2J: 5 tasks crashed\n");
 }
 
 }  // namespace
