@@ -8,8 +8,10 @@
 
 #include <fmt/format.h>
 
+#include "absl/time/clock.h"
 #include "scheduler/server/unary_call.h"
 #include "scheduler/server/upload_call.h"
+#include "services/storage/collection.h"
 
 namespace vorocast::server {
 namespace {
@@ -56,6 +58,7 @@ absl::StatusOr<std::vector<store::FrameAdded>> AskedFrames(const v1::AddFramesRe
     }
     auto digest = CheckBlob(frame.blob());
     if (!digest.ok()) return base::Annotate(digest.status(), fmt::format("frame {}", frame.number()));
+    storage::NoteUse(artifacts.BlobPath(*digest, frame.blob().extension()), absl::Now());
     std::error_code error;
     const auto size = std::filesystem::file_size(artifacts.BlobPath(*digest, frame.blob().extension()), error);
     if (error)
@@ -97,6 +100,7 @@ grpc::ServerUnaryReactor* CapturesService::Missing(grpc::CallbackServerContext* 
     for (const v1::Blob& blob : request->blobs()) {
       const auto digest = CheckBlob(blob);
       if (!digest.ok()) return reactor->Finish(rpc::ToGrpc(digest.status()));
+      storage::NoteUse(artifacts_.BlobPath(*digest, blob.extension()), absl::Now());
       if (!artifacts_.HasBlob(*digest, blob.extension())) *reply->add_blobs() = blob;
     }
     reactor->Finish(grpc::Status::OK);

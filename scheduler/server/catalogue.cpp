@@ -292,6 +292,13 @@ absl::StatusOr<store::FrameAdded> Catalogue::FindFrame(const CatalogueSequence& 
   return missing;
 }
 
+void Catalogue::AddFramesInUse(std::set<base::Digest>& blobs) const {
+  for (const auto& [id, sequence] : sequences_) {
+    if (!sequence.frames) continue;
+    for (const auto& [number, frame] : *sequence.frames) blobs.insert(frame.blob);
+  }
+}
+
 absl::StatusOr<const CatalogueJob*> Catalogue::FindJob(const std::string& id) const {
   const auto found = jobs_.find(id);
   if (found == jobs_.end()) return absl::NotFoundError(fmt::format("there is no job \"{}\"; 'vorocast status' names those there are", id));

@@ -5,6 +5,7 @@
 #include <deque>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -62,6 +63,11 @@ class Catalogue {
 
   /// A captured frame of a sequence. NOT_FOUND names it.
   absl::StatusOr<store::FrameAdded> FindFrame(const CatalogueSequence& sequence, std::int32_t number) const;
+
+  /// Some jobs' tasks are not all known to the core yet.
+  bool is_planning() const { return !plannings_.empty(); }
+  /// Adds the frames of every sequence that is open or has a job that goes on.
+  void AddFramesInUse(std::set<base::Digest>& blobs) const;
 
   // Of what is on record, from any thread.
 

@@ -11,8 +11,11 @@
 
 #include <fmt/format.h>
 
+#include "absl/time/clock.h"
+
 #include "services/rpc/limits.h"
 #include "services/rpc/status.h"
+#include "services/storage/collection.h"
 
 namespace vorocast::server {
 
@@ -30,10 +33,13 @@ void FetchCall::Send(const std::filesystem::path& path, const std::string& sha25
 }
 
 absl::Status FetchCall::Open(const std::filesystem::path& path, const std::string& sha256) {
+  storage::NoteUse(path, absl::Now());
   file_ = open(path.c_str(), O_RDONLY | O_CLOEXEC);
   struct stat info {};
   if (file_ < 0 || fstat(file_, &info) != 0) {
-    return absl::DataLossError(fmt::format("{}: the result is on record but cannot be read: {}; retry the job", path.string(), std::strerror(errno)));
+    return absl::DataLossError(
+        fmt::format("{}: it is on record but cannot be read: {}; if it has been collected, retry the job (a frame: submit the capture again)",
+                    path.string(), std::strerror(errno)));
   }
   left_ = info.st_size;
   chunk_.set_size(info.st_size);

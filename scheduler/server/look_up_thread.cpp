@@ -6,6 +6,9 @@
 
 #include <spdlog/spdlog.h>
 
+#include "absl/time/clock.h"
+#include "services/storage/collection.h"
+
 namespace vorocast::server {
 namespace {
 
@@ -68,8 +71,9 @@ void LookUpThread::Run() {
 
 core::LookUpAnswered LookUpThread::Answer(const core::LookUp& look_up) const {
   core::LookUpAnswered answer{.key = look_up.key};
-  if (!artifacts_.HasArtifact(look_up.key, look_up.extension)) return answer;
   const std::filesystem::path path = artifacts_.ArtifactPath(look_up.key, look_up.extension);
+  storage::NoteUse(path, absl::Now());
+  if (!artifacts_.HasArtifact(look_up.key, look_up.extension)) return answer;
   auto on_record = store_.FindResult(look_up.key);
   if (!on_record.ok()) spdlog::error("look-up failed: key={} error=\"{}\"", look_up.key.Hex(), std::string(on_record.status().message()));
   if (on_record.ok() && *on_record) {

@@ -15,6 +15,7 @@
 #include <nlohmann/json.hpp>
 
 #include "scheduler/fleet/fleet_flags.h"
+#include "scheduler/server/collector_flags.h"
 #include "scheduler/server/scheduler_server.h"
 #include "scheduler/server/standby.h"
 #include "scheduler/store/postgres_store.h"
@@ -30,6 +31,7 @@ struct Options {
   std::string listen;
   fleet::FleetFlags fleet;
   telemetry::TelemetryFlags telemetry;
+  CollectorFlags collector;
 };
 
 constexpr std::size_t kUnixPathMax = 107;
@@ -66,12 +68,12 @@ absl::Status Serve(const Options& options, const sigset_t& stop_signals) {
   const std::string listen = options.listen.empty() ? StableAddress(state) : options.listen;
   std::unique_ptr<SchedulerServer> server;
   if (options.database.empty()) {
-    ASSIGN_OR_RETURN(server, SchedulerServer::Start({.state = state, .listen = listen}));
+    ASSIGN_OR_RETURN(server, SchedulerServer::Start({.state = state, .listen = listen, .collection = options.collector.Parse()}));
   } else {
     ASSIGN_OR_RETURN(std::unique_ptr<store::Store> store, store::OpenPostgresStore(options.database));
     ASSIGN_OR_RETURN(const std::optional<std::string> address, AwaitLeadership(*store, listen, stop_signals));
     if (!address) return absl::OkStatus();
-    ASSIGN_OR_RETURN(server, SchedulerServer::Start({.state = state, .listen = *address}, std::move(store)));
+    ASSIGN_OR_RETURN(server, SchedulerServer::Start({.state = state, .listen = *address, .collection = options.collector.Parse()}, std::move(store)));
   }
   ASSIGN_OR_RETURN(const auto metrics, options.telemetry.StartMetrics(server->metrics()));
   ASSIGN_OR_RETURN(std::vector<std::unique_ptr<fleet::Fleet>> fleets,
@@ -115,6 +117,7 @@ int Main(int argc, char** argv) {
   app.add_option("--listen", options.listen, "HOST:PORT or unix:/path (default: a socket in the state folder)");
   options.fleet.AddTo(app);
   options.telemetry.AddTo(app);
+  options.collector.AddTo(app);
   CLI11_PARSE(app, argc, argv);
 
   absl::Status status = Validate(options);

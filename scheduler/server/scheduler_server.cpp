@@ -58,6 +58,7 @@ struct SchedulerServer::Parts {
   JobsService jobs{engine, catalogue, watchers, artifacts, *disk, fleet};
   DispatchService dispatch{engine, std::filesystem::absolute(artifacts.root()).lexically_normal().string()};
   std::unique_ptr<LookUpThread> look_ups;
+  std::unique_ptr<Collector> collector;
   std::unique_ptr<rpc::Server> server;
 
   absl::Status Restore();
@@ -98,6 +99,7 @@ void SchedulerServer::Parts::StartEngine() {
 }
 
 SchedulerServer::Parts::~Parts() {
+  collector.reset();
   if (server) {
     engine.Enqueue([this](Turn& turn) { turn.After([this] { watchers.EndAll(absl::UnavailableError("the scheduler is stopping")); }); });
     dispatch.EndStreams();
@@ -114,6 +116,8 @@ SchedulerServer::~SchedulerServer() = default;
 
 void SchedulerServer::DescribeFleet(std::function<std::string()> describe) { parts_->fleet.Set(std::move(describe)); }
 const std::shared_ptr<prometheus::Registry>& SchedulerServer::metrics() const { return parts_->metrics.registry(); }
+
+absl::StatusOr<CollectionPlan> SchedulerServer::Collect() { return parts_->collector->Collect(); }
 
 const std::string& SchedulerServer::address() const { return parts_->server->address(); }
 
@@ -140,6 +144,7 @@ absl::StatusOr<std::unique_ptr<SchedulerServer>> SchedulerServer::Start(const Sc
   parts->metrics.SetTerm(parts->store->term());
   RETURN_IF_ERROR(parts->Restore());
   parts->StartEngine();
+  parts->collector = std::make_unique<Collector>(parts->engine, parts->catalogue, parts->artifacts, parts->metrics, options.collection);
   ASSIGN_OR_RETURN(parts->server, rpc::StartServer({.listen = options.listen, .services = {&parts->captures, &parts->jobs, &parts->dispatch}}));
   return std::unique_ptr<SchedulerServer>(new SchedulerServer(std::move(parts)));
 }

@@ -9,6 +9,7 @@
 #include <prometheus/registry.h>
 
 #include "scheduler/fleet/sizing.h"
+#include "scheduler/server/collector.h"
 #include "scheduler/store/store.h"
 #include "services/base/status.h"
 
@@ -17,6 +18,7 @@ namespace vorocast::server {
 struct SchedulerOptions {
   std::filesystem::path state;  // holds the artifact folder, and scheduler.db unless the state is kept elsewhere
   std::string listen;           // host:port or unix:/path
+  CollectorOptions collection;
   /// Told, from any thread, when this scheduler must not go on: another leads, or its store is damaged. By default the process ends.
   std::function<void(const absl::Status&)> lost;
 };
@@ -41,6 +43,8 @@ class SchedulerServer {
   /// How who lists jobs is told where workers come from; called from any thread. Nothing: nobody manages them.
   void DescribeFleet(std::function<std::string()> describe);
   const std::shared_ptr<prometheus::Registry>& metrics() const;
+  /// One round of collection, now rather than at its time.
+  absl::StatusOr<CollectionPlan> Collect();
 
  private:
   struct Parts;

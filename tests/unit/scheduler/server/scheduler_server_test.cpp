@@ -47,7 +47,7 @@ class SchedulerServerTest : public testing::Test {
   }
 
   void StartScheduler() {
-    auto server = SchedulerServer::Start({.state = state_, .listen = address_});
+    auto server = SchedulerServer::Start({.state = state_, .listen = address_, .collection = collection_});
     ASSERT_TRUE(server.ok()) << server.status();
     server_ = *std::move(server);
     captures_ = v1::Captures::NewStub(rpc::Connect(address_));
@@ -186,6 +186,7 @@ class SchedulerServerTest : public testing::Test {
 
   std::filesystem::path state_;
   std::string address_;
+  CollectorOptions collection_;
   std::unique_ptr<SchedulerServer> server_;
   std::optional<storage::ArtifactStore> artifacts_;
   std::unique_ptr<v1::Captures::StubInterface> captures_;
@@ -560,6 +561,76 @@ TEST_F(SchedulerServerTest, TellsWhereWorkersComeFrom) {
   const auto list = Call<v1::Jobs::StubInterface>(*jobs_, &v1::Jobs::StubInterface::List, v1::ListJobsRequest());
   ASSERT_TRUE(list.ok()) << list.status();
   EXPECT_EQ(list->fleet().description(), "Slurm: 3 workers up");
+}
+
+TEST_F(SchedulerServerTest, OnlyWhatNoUnfinishedJobReadsIsCollectedAndAskedForAgainItIsMadeAgain) {
+  // The clock of the collection says that everything is forty days old.
+  collection_ = {.policy = {.keep = absl::Hours(24 * 30)}, .now = [] { return absl::Now() + absl::Hours(24 * 40); }};
+  server_.reset();
+  StartScheduler();
+  const auto sequence = Open();
+  ASSERT_TRUE(AddFrames(sequence->id(), 0, 6).ok() && Close(sequence->id()).ok());
+  const auto first = Submit(sequence->id());
+  StartWorker({.holds = [](const std::string& label) { return label.starts_with("simulate"); }});
+  ASSERT_EQ(WatchToEnd(first->id())->state(), v1::DONE);
+  // A second job shares all of the first one's results but the sheets, and is held at its last stage.
+  const auto second = Submit(sequence->id(), [](v1::SubmitJobRequest& request) {
+    request.set_sheets(false);
+    request.set_effect_json(R"({"name": "calm"})");
+  });
+  ASSERT_TRUE(second.ok()) << second.status();
+  ASSERT_TRUE(Await([&] { return Attempts(second->id()).value_or(std::vector<v1::TaskAttempt>{}).size() == 1; }));
+  const auto shared = server_->Collect();
+  ASSERT_TRUE(shared.ok()) << shared.status();
+  EXPECT_EQ(shared->remove.size(), 3u);  // the first one's sheets
+  for (const Collected& gone : shared->remove) EXPECT_EQ(gone.file.extension, ".png");
+  EXPECT_TRUE(Fetch(second->id(), "tracked.h5").ok());
+  EXPECT_TRUE(Fetch(second->id(), "capture/frame_000003.ply").ok());
+  EXPECT_EQ(Fetch(first->id(), "sheets/cells.png").status().code(), absl::StatusCode::kDataLoss);
+  worker_->Release();
+  ASSERT_EQ(WatchToEnd(second->id())->state(), v1::DONE);
+
+  // Now nobody needs anything; frames too go.
+  const auto all = server_->Collect();
+  ASSERT_TRUE(all.ok()) << all.status();
+  EXPECT_EQ(all->bytes, all->bytes_before);
+  EXPECT_EQ(all->bytes_in_use, 0);
+  EXPECT_FALSE(artifacts_->HasBlob(base::HashBytes(Bytes(3)), ".ply"));
+  EXPECT_EQ(server_->Collect()->bytes_before, 0);
+  // The client sends the frames again, and everything is computed again.
+  for (int frame = 0; frame < 6; ++frame) ASSERT_TRUE(Upload(BlobOf(frame), Bytes(frame)).ok());
+  const auto third = Submit(sequence->id());
+  ASSERT_EQ(WatchToEnd(third->id())->state(), v1::DONE);
+  EXPECT_EQ(worker_->executed()["frame 3: tessellate"], 2);
+  EXPECT_EQ(worker_->executed()["assemble"], 2);
+  EXPECT_EQ(*Fetch(third->id(), "tracked.h5"), "assemble");
+}
+
+TEST_F(SchedulerServerTest, FramesOfAnOpenTakeAndWhatIsYoungStay) {
+  collection_ = {.policy = {.keep = absl::Hours(1), .keep_at_least = absl::Hours(24)}, .now = [] { return absl::Now() + absl::Hours(2); }};
+  server_.reset();
+  StartScheduler();
+  const auto sequence = Open();
+  ASSERT_TRUE(AddFrames(sequence->id(), 0, 3).ok());
+  ASSERT_TRUE(Upload(BlobOf(7), Bytes(7)).ok());  // of no take yet
+  EXPECT_TRUE(server_->Collect()->remove.empty());
+  server_.reset();
+  collection_.now = [] { return absl::Now() + absl::Hours(48); };
+  StartScheduler();
+  const auto plan = server_->Collect();
+  ASSERT_TRUE(plan.ok()) << plan.status();
+  ASSERT_EQ(plan->remove.size(), 1u);
+  EXPECT_EQ(plan->remove[0].file.digest, base::HashBytes(Bytes(7)));
+  EXPECT_TRUE(artifacts_->HasBlob(base::HashBytes(Bytes(1)), ".ply"));
+}
+
+TEST_F(SchedulerServerTest, ADryRunRemovesNothing) {
+  collection_ = {.policy = {.keep = absl::Hours(1)}, .dry_run = true, .now = [] { return absl::Now() + absl::Hours(48); }};
+  server_.reset();
+  StartScheduler();
+  ASSERT_TRUE(Upload(BlobOf(7), Bytes(7)).ok());
+  EXPECT_EQ(server_->Collect()->remove.size(), 1u);
+  EXPECT_TRUE(artifacts_->HasBlob(base::HashBytes(Bytes(7)), ".ply"));
 }
 
 }  // namespace
