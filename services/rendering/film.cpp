@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "services/rendering/film_scene.h"
+#include "services/rendering/ground_shadow.h"
 #include "services/rendering/palette.h"
 
 namespace vorocast::rendering {
@@ -21,6 +22,7 @@ constexpr float kFar = 1e4F;
 constexpr int kRefined = 4;           // so many times more rays where a pixel is not of one piece
 constexpr float kStillPixels = 0.5F;  // what moves less than this while the shutter is open is not blurred
 constexpr int kRefinedSamplesMax = 64;
+constexpr std::size_t kBatch = StudioLight::kShadeMax;  // rays looked along at once
 
 /// The k-th of a sequence that fills the unit square evenly, however many are taken of it (R2, Roberts 2018); both start at the pixel's jitter.
 std::array<float, 2> LensPoint(int k, const Jitter& jitter) {
@@ -37,17 +39,16 @@ float ShutterTime(int k, const Jitter& jitter) {
 /// A pixel while its rays come in.
 class PixelSum {
  public:
-  void Add(const Seen& seen, std::int32_t id, float depth) {
+  void AddOpen() {
     ++rays_;
-    if (!seen.hit) {
-      shadow_ += seen.unshadowed;
-      ++open_;
-      return;
-    }
-    colour_ += seen.colour;
+    ++open_;
+  }
+  void Add(const Vec3f& colour, const Hit& hit, std::int32_t id, float depth) {
+    ++rays_;
+    colour_ += colour;
     if (depth < depth_) {
       depth_ = depth;
-      nearest_ = *seen.hit;
+      nearest_ = hit;
     }
     for (Counted& counted : counted_) {
       if (counted.rays > 0 && counted.id != id) continue;
@@ -60,6 +61,7 @@ class PixelSum {
   int rays() const { return rays_; }
   bool IsOfOnePiece() const { return open_ == rays_ || counted_[0].rays == rays_; }
   bool HasHit() const { return open_ < rays_; }
+  bool HasOpen() const { return open_ > 0; }
   float depth() const { return depth_; }
   const Hit& nearest() const { return nearest_; }
 
@@ -67,7 +69,6 @@ class PixelSum {
     const auto n = static_cast<float>(rays_);
     return {colour_.x() / n, colour_.y() / n, colour_.z() / n, static_cast<float>(rays_ - open_) / n};
   }
-  Vec3f Shadow() const { return open_ == 0 ? Vec3f(Vec3f::Ones()) : Vec3f(shadow_ / static_cast<float>(open_)); }
 
   std::array<FilmPicture::Coverage, 6> Coverage() {
     std::ranges::stable_sort(counted_,
@@ -86,16 +87,54 @@ class PixelSum {
   int rays_ = 0;
   int open_ = 0;  // rays that met nothing but the ground or the backdrop
   Vec3f colour_ = Vec3f::Zero();
-  Vec3f shadow_ = Vec3f::Zero();
   float depth_ = std::numeric_limits<float>::infinity();
   Hit nearest_;
   std::array<Counted, 16> counted_{};  // a pixel with more pieces than this loses the smallest ones
 };
 
-/// Where a pixel takes many camera rays, each sends on fewer.
+/// The faces that a pixel's rays have met, each with the mean of its colours there. A seam or an edge takes many camera rays, but light hardly
+/// changes over a pixel of a face, so that later rays need not ask for it again.
+class PixelFaces {
+ public:
+  /// The face that a hit is on, or −1 if there is none yet.
+  int Find(const Hit& hit, std::int32_t id) const {
+    constexpr float kSameNormal = 0.9999F;
+    for (int i = 0; i < count_; ++i) {
+      const Face& face = faces_[static_cast<std::size_t>(i)];
+      if (face.id == id && face.normal.dot(hit.normal) > kSameNormal) return i;
+    }
+    return -1;
+  }
+  void Add(const Hit& hit, std::int32_t id, const Vec3f& colour) {
+    int at = Find(hit, id);
+    if (at < 0) {
+      at = count_++;
+      faces_[static_cast<std::size_t>(at)] = {.id = id, .rays = 0, .normal = hit.normal, .sum = Vec3f::Zero()};
+    }
+    Face& face = faces_[static_cast<std::size_t>(at)];
+    face.sum += colour;
+    ++face.rays;
+  }
+  Vec3f Colour(int face) const {
+    const Face& one = faces_[static_cast<std::size_t>(face)];
+    return one.sum / static_cast<float>(one.rays);
+  }
+
+ private:
+  struct Face {
+    std::int32_t id;
+    int rays;
+    Vec3f normal;
+    Vec3f sum;
+  };
+  std::array<Face, kRefinedSamplesMax> faces_;
+  int count_ = 0;
+};
+
+/// Where rays meet things at different times, each sends on a few of its own; elsewhere the first rays of a pixel send on many.
 struct Lights {
   StudioLight even;
-  StudioLight refined;
+  StudioLight blurred;
 };
 
 int RefinedSamples(const FilmQuality& quality) { return std::min(kRefinedSamplesMax, kRefined * quality.samples); }
@@ -108,6 +147,7 @@ class FilmCamera {
         camera_(camera),
         quality_(quality),
         seconds_(seconds_per_picture),
+        shadow_(lights.even, camera, quality.shutter > 0, quality.samples),
         blurred_(static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height)) {}
 
   /// Marks the pixels that something moving may cross while the shutter is open: few rays would miss what is there only for a moment.
@@ -127,16 +167,21 @@ class FilmCamera {
     }
   }
 
-  void Expose(std::int32_t column, std::int32_t row, FilmPicture& picture) const {
+  void Expose(std::int32_t column, std::int32_t row, FilmPicture& picture) {
     const Ray middle = camera_.Through(static_cast<float>(column) + 0.5F, static_cast<float>(row) + 0.5F, kFar);
     if (lights_.even.SeesNothing(middle, camera_.pixel)) return;
     const Jitter jitter(column, row);
     PixelSum sum;
     const std::size_t at = At(column, row);
-    if (!blurred_[at]) AddRays(lights_.even, quality_.samples, column, row, jitter, sum);
-    if (blurred_[at] || !sum.IsOfOnePiece()) AddRays(lights_.refined, RefinedSamples(quality_) - sum.rays(), column, row, jitter, sum);
+    PixelFaces faces;
+    if (blurred_[at]) {
+      AddRays(lights_.blurred, RefinedSamples(quality_), RefinedSamples(quality_), column, row, jitter, faces, sum);
+    } else {
+      AddRays(lights_.even, quality_.samples, quality_.samples, column, row, jitter, faces, sum);
+      if (!sum.IsOfOnePiece()) AddRays(lights_.even, RefinedSamples(quality_) - quality_.samples, quality_.samples, column, row, jitter, faces, sum);
+    }
     picture.rgba[at] = sum.Rgba();
-    picture.shadow[at] = sum.Shadow();
+    if (sum.HasOpen()) picture.shadow[at] = shadow_.At(column, row);
     if (!sum.HasHit()) return;
     picture.coverage[at] = sum.Coverage();
     const Hit& hit = sum.nearest();
@@ -169,14 +214,43 @@ class FilmCamera {
     }
   }
 
-  void AddRays(const StudioLight& light, int count, std::int32_t column, std::int32_t row, const Jitter& jitter, PixelSum& sum) const {
-    for (int i = 0; i < count; ++i) {
-      const int k = sum.rays();
-      const auto lens = LensPoint(k, jitter);
-      Ray ray = camera_.Through(static_cast<float>(column) + lens[0], static_cast<float>(row) + lens[1], kFar);
-      ray.time = quality_.shutter > 0 ? ShutterTime(k, jitter) : 0;
-      const Seen seen = light.Look(ray, k, jitter);
-      sum.Add(seen, seen.hit ? scene_.IdOf(*seen.hit) : 0, seen.hit ? seen.hit->distance * ray.direction.dot(camera_.forward) : 0);
+  /// The pixel's next rays. The first `shaded` of all are shaded, and those that meet a face that none has met; others take their face's colour.
+  void AddRays(const StudioLight& light, int count, int shaded, std::int32_t column, std::int32_t row, const Jitter& jitter, PixelFaces& faces,
+               PixelSum& sum) const {
+    std::array<Ray, kBatch> rays;
+    std::array<std::optional<Hit>, kBatch> hits;
+    std::array<Lit, kBatch> lit;
+    for (int left = count; left > 0;) {
+      const int first = sum.rays();
+      const auto number = std::min(static_cast<std::size_t>(left), kBatch);
+      for (std::size_t i = 0; i < number; ++i) {
+        const int k = first + static_cast<int>(i);
+        const auto lens = LensPoint(k, jitter);
+        rays[i] = camera_.Through(static_cast<float>(column) + lens[0], static_cast<float>(row) + lens[1], kFar);
+        rays[i].time = quality_.shutter > 0 ? ShutterTime(k, jitter) : 0;
+      }
+      light.Look(std::span(rays).first(number), std::span(hits).first(number));
+      std::size_t lit_count = 0;
+      for (std::size_t i = 0; i < number; ++i) {
+        const int k = first + static_cast<int>(i);
+        if (hits[i] && (k < shaded || faces.Find(*hits[i], scene_.IdOf(*hits[i])) < 0)) {
+          lit[lit_count++] = {.ray = rays[i], .hit = *hits[i], .sample = k};
+        }
+      }
+      light.Shade(std::span(lit).first(lit_count), jitter);
+      std::size_t next = 0;
+      for (const Lit& one : std::span(lit).first(lit_count)) faces.Add(one.hit, scene_.IdOf(one.hit), one.colour);
+      for (std::size_t i = 0; i < number; ++i) {
+        if (!hits[i]) {
+          sum.AddOpen();
+          continue;
+        }
+        const std::int32_t id = scene_.IdOf(*hits[i]);
+        const bool own = next < lit_count && lit[next].sample == first + static_cast<int>(i);
+        const Vec3f colour = own ? lit[next++].colour : faces.Colour(faces.Find(*hits[i], id));
+        sum.Add(colour, *hits[i], id, hits[i]->distance * rays[i].direction.dot(camera_.forward));
+      }
+      left -= static_cast<int>(number);
     }
   }
 
@@ -196,6 +270,7 @@ class FilmCamera {
   const Camera& camera_;
   const FilmQuality& quality_;
   double seconds_;
+  GroundShadow shadow_;
   std::vector<bool> blurred_;
 };
 
@@ -218,11 +293,9 @@ absl::Status Check(const Camera& camera, const FilmQuality& quality) {
 absl::StatusOr<FilmPicture> RenderFilmPicture(const FilmSubject& subject, const Camera& camera, const Studio& studio, const FilmQuality& quality,
                                               const base::Progress& progress) {
   RETURN_IF_ERROR(Check(camera, quality));
-  ASSIGN_OR_RETURN(const FilmScene scene, FilmScene::Build(subject, quality.shutter > 0));
-  const Lights lights = {
-      StudioLight(scene.rays(), camera, studio, {.samples = quality.samples, .sky = 3, .key_ground = 3, .key_surface = 1}),
-      StudioLight(scene.rays(), camera, studio, {.samples = RefinedSamples(quality), .sky = 1, .key_ground = 1, .key_surface = 1}),
-  };
+  ASSIGN_OR_RETURN(const FilmScene scene, FilmScene::Build(subject));
+  const Lights lights = {StudioLight(scene.rays(), camera, studio, {.samples = quality.samples, .sky = 3, .key = 1}),
+                         StudioLight(scene.rays(), camera, studio, {.samples = RefinedSamples(quality), .sky = 1, .key = 1})};
   FilmCamera film(scene, lights, camera, quality, subject.seconds_per_picture);
   film.FindBlur();
   FilmPicture picture;

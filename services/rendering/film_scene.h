@@ -12,8 +12,8 @@ namespace vorocast::rendering {
 /// A film subject as rays meet it, and what a hit is of. The subject must outlive it.
 class FilmScene {
  public:
-  /// `moving`: with the shutter's two ends; else as it opens. INVALID_ARGUMENT for arrays of different lengths or poses that are not finite.
-  static absl::StatusOr<FilmScene> Build(const FilmSubject& subject, bool moving);
+  /// As the shutter opens and as it closes. INVALID_ARGUMENT for arrays of different lengths or poses that are not finite.
+  static absl::StatusOr<FilmScene> Build(const FilmSubject& subject);
 
   const Scene& rays() const { return scene_; }
   /// The cell, or kObjectId − number of the scene object.

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -146,6 +147,25 @@ absl::StatusOr<Scene> Scene::Build(const std::vector<Disc>& discs, const std::ve
 const Vec3f& Scene::low() const { return tree_->low; }
 const Vec3f& Scene::high() const { return tree_->high; }
 
+Hit Scene::HitOf(std::uint32_t geometry, std::uint32_t primitive, float distance, const Vec3f& normal) const {
+  Hit hit;
+  hit.distance = distance;
+  if (geometry == 0) {
+    const Disc& disc = tree_->discs[primitive];
+    hit.normal = disc.normal;
+    hit.colour = disc.colour;
+    hit.clearance = 1.5F * disc.radius;
+    return hit;
+  }
+  hit.normal = normal.normalized();
+  hit.mesh = geometry - 1;
+  hit.triangle = primitive;
+  hit.colour = tree_->mesh_colours[hit.mesh][hit.triangle];
+  hit.metal = tree_->mesh_metal[hit.mesh];
+  hit.clearance = kTriangleClearance;
+  return hit;
+}
+
 std::optional<Hit> Scene::Intersect(const Ray& ray) const {
   if (tree_->Misses(ray)) return std::nullopt;
   RTCRayHit query{};
@@ -156,31 +176,23 @@ std::optional<Hit> Scene::Intersect(const Ray& ray) const {
   context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
   rtcIntersect1(tree_->scene.get(), &context, &query);
   if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
-  Hit hit;
-  hit.distance = query.ray.tfar;
-  if (query.hit.geomID == 0) {
-    const Disc& disc = tree_->discs[query.hit.primID];
-    hit.normal = disc.normal;
-    hit.colour = disc.colour;
-    hit.clearance = 1.5F * disc.radius;
-    return hit;
-  }
-  hit.normal = Vec3f(query.hit.Ng_x, query.hit.Ng_y, query.hit.Ng_z).normalized();
-  hit.mesh = query.hit.geomID - 1;
-  hit.triangle = query.hit.primID;
-  hit.colour = tree_->mesh_colours[hit.mesh][hit.triangle];
-  hit.metal = tree_->mesh_metal[hit.mesh];
-  hit.clearance = kTriangleClearance;
-  return hit;
+  return HitOf(query.hit.geomID, query.hit.primID, query.ray.tfar, {query.hit.Ng_x, query.hit.Ng_y, query.hit.Ng_z});
 }
 
-bool Scene::Occludes(const Ray& ray) const {
-  if (tree_->Misses(ray)) return false;
-  RTCRay query = ToEmbree(ray);
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  rtcOccluded1(tree_->scene.get(), &context, &query);
-  return query.tfar < 0;
+void Scene::Intersect(std::span<const Ray> rays, std::span<std::optional<Hit>> hits) const {
+  for (std::size_t i = 0; i < rays.size(); ++i) hits[i] = Intersect(rays[i]);
+}
+
+void Scene::Occludes(std::span<const Ray> rays, std::span<std::uint8_t> occluded) const {
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    occluded[i] = 0;
+    if (tree_->Misses(rays[i])) continue;
+    RTCRay query = ToEmbree(rays[i]);
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    rtcOccluded1(tree_->scene.get(), &context, &query);
+    occluded[i] = query.tfar < 0 ? 1 : 0;
+  }
 }
 
 }  // namespace vorocast::rendering

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "services/base/status.h"
@@ -58,10 +59,14 @@ class Scene {
   const geometry::Vec3f& low() const;
   const geometry::Vec3f& high() const;
   std::optional<Hit> Intersect(const Ray& ray) const;
-  bool Occludes(const Ray& ray) const;
+  /// The same for many rays: `hits[i]` is ray i's.
+  void Intersect(std::span<const Ray> rays, std::span<std::optional<Hit>> hits) const;
+  /// `occluded[i]` is 1 where anything is within the reach of ray i, else 0.
+  void Occludes(std::span<const Ray> rays, std::span<std::uint8_t> occluded) const;
 
  private:
   struct Tree;
+  Hit HitOf(std::uint32_t geometry, std::uint32_t primitive, float distance, const geometry::Vec3f& normal) const;
   explicit Scene(std::unique_ptr<Tree> tree);
   std::unique_ptr<Tree> tree_;
 };

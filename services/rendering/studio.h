@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <optional>
+#include <span>
 
 #include "services/rendering/camera.h"
 #include "services/rendering/scene.h"
@@ -14,12 +17,13 @@ struct Studio {
   float extent = 2;  // of the subject, metres: sets how far ambient shadows reach
 };
 
-/// Rays that one camera ray sends on. A pixel's rays should come to about sixteen of each kind.
+/// Rays that one camera ray sends on from a surface. A pixel's rays should come to about sixteen towards the sky.
 struct LightRays {
-  int samples = 4;      // camera rays a pixel
-  int sky = 4;          // for each of them
-  int key_ground = 4;   // a large shadow on the bare ground shows grain that a coloured surface hides, and rays from there mostly meet nothing
-  int key_surface = 1;  // which costs little
+  int samples = 4;  // camera rays a pixel
+  int sky = 4;      // for each of them, at most kSkyMax
+  int key = 1;      // at most kKeyMax; this costs little, for the light is small
+  static constexpr int kSkyMax = 4;
+  static constexpr int kKeyMax = 4;
 };
 
 /// Two numbers in [0, 1) for a pixel. Interleaved gradient noise (Jimenez 2014): neighbours differ so evenly that what is left of it looks
@@ -29,11 +33,19 @@ struct Jitter {
   Jitter(std::int32_t column, std::int32_t row);
 };
 
-/// What a camera ray sees.
-struct Seen {
-  std::optional<Hit> hit;                                // none: the ground, or nothing
-  geometry::Vec3f colour = geometry::Vec3f::Zero();      // of the hit, lit; linear, below 1
-  geometry::Vec3f unshadowed = geometry::Vec3f::Ones();  // without a hit: how much of the light the subject leaves the ground here, 0 … 1
+/// A surface that a camera ray has met, and the light that comes from there.
+struct Lit {
+  Ray ray;
+  Hit hit;
+  int sample = 0;                                    // which of the pixel's rays it is
+  geometry::Vec3f colour = geometry::Vec3f::Zero();  // linear, below 1
+};
+
+/// A small parallelogram of the ground: what a pixel shows of it.
+struct GroundPatch {
+  geometry::Vec3f middle;
+  geometry::Vec3f across;  // its edges
+  geometry::Vec3f along;
 };
 
 /// Lights what camera rays meet. Deterministic: noise comes from the pixel.
@@ -44,21 +56,32 @@ class StudioLight {
 
   /// True only where no ray within `spread` (at distance 1) of this one meets anything, not even a shadow on the ground.
   bool SeesNothing(const Ray& ray, float spread) const;
-  /// `sample`: 0 … samples−1, which of the pixel's rays it is.
-  Seen Look(const Ray& ray, int sample, const Jitter& jitter) const;
+  /// What rays meet before the ground: `hits[i]` is ray i's. None: the ground, or nothing.
+  void Look(std::span<const Ray> rays, std::span<std::optional<Hit>> hits) const;
+  /// Sets the colours of hits of one pixel, at most kShadeMax of them.
+  void Shade(std::span<Lit> hits, const Jitter& jitter) const;
+  static constexpr std::size_t kShadeMax = 16;
+  /// Where a ray meets the ground, as if nothing stood on it; none above the horizon.
+  std::optional<geometry::Vec3f> OnGround(const Ray& ray) const;
+  /// How much of the light the subject leaves a patch of the ground, 0 … 1, in the mean over the shutter's time where `moving`. Exactly one where
+  /// nothing is in the way. `rays` of each kind at most, up to kGroundRaysMax; `seed` decides where they go.
+  geometry::Vec3f Unshadowed(const GroundPatch& patch, int rays, bool moving, std::uint64_t seed) const;
+  static constexpr int kGroundRaysMax = 256;
 
  private:
-  geometry::Vec3f Surface(const Ray& ray, const Hit& hit, int sample, const Jitter& jitter) const;
+  /// A hit while its light is looked for.
+  struct Open;
+  void SendOn(const Lit& lit, const Jitter& jitter, Open& open, std::span<Ray> sent) const;
+  geometry::Vec3f Gather(const Lit& lit, const Open& open, std::span<const Ray> sent, std::span<const std::uint8_t> blocked) const;
+  geometry::Vec3f KeyDirection(const std::array<float, 2>& disc) const;
   bool IsFarFromAll(const geometry::Vec3f& from, float margin) const;
   bool MeetsBox(const geometry::Vec3f& from, const geometry::Vec3f& direction, float margin) const;
-  geometry::Vec3f Unshadowed(const Ray& ray, const geometry::Vec3f& point, int sample, const Jitter& jitter) const;
-  float Key(const Ray& ray, const geometry::Vec3f& from, const geometry::Vec3f& normal, int rays, int sample, const Jitter& jitter) const;
-  geometry::Vec3f Sky(const Ray& ray, const geometry::Vec3f& from, const geometry::Vec3f& normal, int sample, const Jitter& jitter) const;
 
   const Scene& scene_;
   const Studio& studio_;
   LightRays rays_;
-  geometry::Vec3f key_;  // unit, towards the light
+  geometry::Vec3f key_;            // unit, towards the light
+  geometry::Vec3f key_x_, key_y_;  // across it
 };
 
 /// The backdrop of a row, linear: what a pixel shows where nothing stands and no shadow falls.
