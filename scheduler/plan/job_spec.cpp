@@ -27,6 +27,23 @@ absl::Status ReadOptions(const nlohmann::json& json, const char* name, Options& 
   return base::Annotate(tasks::FromJson(*field, options), fmt::format("job.{}", name));
 }
 
+absl::StatusOr<OntoTake> OntoFromJson(const nlohmann::json& json) {
+  if (!json.is_object()) return absl::InvalidArgumentError("job.onto is not an object");
+  OntoTake onto;
+  RETURN_IF_ERROR(Read(json, "sequence", onto.sequence));
+  RETURN_IF_ERROR(Read(json, "metres_per_unit", onto.capture.metres_per_unit));
+  RETURN_IF_ERROR(Read(json, "up", onto.capture.up));
+  RETURN_IF_ERROR(Read(json, "frames_per_second", onto.frames_per_second));
+  return onto;
+}
+
+nlohmann::json OntoJson(const OntoTake& onto) {
+  return {{"sequence", onto.sequence},
+          {"metres_per_unit", onto.capture.metres_per_unit},
+          {"up", onto.capture.up},
+          {"frames_per_second", onto.frames_per_second}};
+}
+
 }  // namespace
 
 nlohmann::json ToJson(const JobSpec& job) {
@@ -41,7 +58,8 @@ nlohmann::json ToJson(const JobSpec& job) {
           {"track", tasks::ToJson(job.track)},
           {"effect", job.effect},
           {"sheets", job.sheets},
-          {"film", job.film ? tasks::ToJson(*job.film) : nlohmann::json()}};
+          {"film", job.film ? tasks::ToJson(*job.film) : nlohmann::json()},
+          {"onto", job.onto ? OntoJson(*job.onto) : nlohmann::json()}};
 }
 
 absl::StatusOr<JobSpec> JobSpecFromJson(const nlohmann::json& json) {
@@ -59,6 +77,9 @@ absl::StatusOr<JobSpec> JobSpecFromJson(const nlohmann::json& json) {
   RETURN_IF_ERROR(Read(json, "effect", job.effect));
   RETURN_IF_ERROR(Read(json, "sheets", job.sheets));
   if (const auto film = json.find("film"); film != json.end() && !film->is_null()) RETURN_IF_ERROR(ReadOptions(json, "film", job.film.emplace()));
+  if (const auto onto = json.find("onto"); onto != json.end() && !onto->is_null()) {
+    ASSIGN_OR_RETURN(job.onto, OntoFromJson(*onto));
+  }
   return job;
 }
 

@@ -23,6 +23,8 @@ constexpr std::string_view kAssemble = "assemble";
 
 std::string TessellateName(std::int32_t frame) { return fmt::format("frame {}: tessellate", frame); }
 
+std::string OfOnto(const std::string& task) { return "onto: " + task; }
+
 std::string SimulateName(const nlohmann::json& effect) {
   const auto name = effect.find("name");
   return fmt::format("{}: simulate", name != effect.end() && name->is_string() ? name->get<std::string>() : "effect");
@@ -141,11 +143,13 @@ PlannedTask Assemble(const JobSpec& job, const std::vector<PlannedFrame>& frames
 }
 
 PlannedTask Simulate(const JobSpec& job) {
-  return {.name = SimulateName(job.effect),
-          .kind = tasks::Kind::kSimulate,
-          .options = tasks::ToJson(tasks::SimulateOptions{.effect = job.effect}),
-          .inputs = {Result("tracked", std::string(kAssemble))},
-          .output = "simulated.h5"};
+  PlannedTask task{.name = SimulateName(job.effect),
+                   .kind = tasks::Kind::kSimulate,
+                   .options = tasks::ToJson(tasks::SimulateOptions{.effect = job.effect}),
+                   .inputs = {Result("tracked", std::string(kAssemble))},
+                   .output = "simulated.h5"};
+  if (job.onto) task.inputs.push_back(Result("target", OfOnto(std::string(kAssemble))));
+  return task;
 }
 
 PlannedTask Sheet(const JobSpec& job, const std::string& stage, std::vector<PlannedInput> inputs) {
@@ -157,6 +161,7 @@ PlannedTask Sheet(const JobSpec& job, const std::string& stage, std::vector<Plan
           .output = fmt::format("sheets/{}.png", stage)};
 }
 
+/// Of what is computed before any effect.
 std::vector<PlannedTask> Sheets(const JobSpec& job, const std::vector<PlannedFrame>& frames) {
   std::vector<PlannedInput> points;
   std::vector<PlannedInput> cells;
@@ -169,9 +174,6 @@ std::vector<PlannedTask> Sheets(const JobSpec& job, const std::vector<PlannedFra
   sheets.push_back(Sheet(job, "points", std::move(points)));
   sheets.push_back(Sheet(job, "cells", std::move(cells)));
   sheets.push_back(Sheet(job, "tracked", {Result("tracked", std::string(kAssemble))}));
-  if (!job.effect.is_null()) {
-    sheets.push_back(Sheet(job, "simulated", {Result("simulated", SimulateName(job.effect)), Result("tracked", std::string(kAssemble))}));
-  }
   return sheets;
 }
 
@@ -205,18 +207,10 @@ bool HasFrame(const std::vector<PlannedFrame>& frames, std::int32_t number) {
   return std::any_of(frames.begin(), frames.end(), [number](const PlannedFrame& frame) { return frame.number == number; });
 }
 
-}  // namespace
+void Append(std::vector<PlannedTask> more, std::vector<PlannedTask>& planned) { std::move(more.begin(), more.end(), std::back_inserter(planned)); }
 
-std::int32_t InterpolatedMax(const JobSpec& job, std::int32_t frame_count) {
-  return job.interpolated_max >= 0 ? job.interpolated_max : frame_count / 10;
-}
-
-absl::StatusOr<std::vector<PlannedTask>> Plan(const JobSpec& job, const std::vector<PlannedFrame>& unordered, bool closed) {
-  ASSIGN_OR_RETURN(const std::vector<PlannedFrame> frames, Ordered(unordered));
-  if (job.window_frames < 1 || job.overlap_frames < 0 || job.overlap_frames >= job.window_frames) {
-    return absl::InvalidArgumentError(fmt::format("windows of {} frames cannot share {} with the next", job.window_frames, job.overlap_frames));
-  }
-  if (job.stretch_frames < 1) return absl::InvalidArgumentError(fmt::format("stretches of {} frames cannot be followed", job.stretch_frames));
+/// From frames to tracked.h5.
+absl::StatusOr<std::vector<PlannedTask>> PlanTracking(const JobSpec& job, const std::vector<PlannedFrame>& frames, bool closed) {
   if (closed && frames.empty()) return absl::FailedPreconditionError("the take was closed without a frame");
   const bool template_known = job.template_frame >= 0 && HasFrame(frames, job.template_frame);
   if (closed && job.template_frame >= 0 && !template_known) {
@@ -238,15 +232,65 @@ absl::StatusOr<std::vector<PlannedTask>> Plan(const JobSpec& job, const std::vec
     windows.push_back(Track(job, frames, stretches, window));
   }
   PlannedTask assemble = Assemble(job, frames, windows);
-  std::move(windows.begin(), windows.end(), std::back_inserter(planned));
+  Append(std::move(windows), planned);
   planned.push_back(std::move(assemble));
-  if (!job.effect.is_null()) planned.push_back(Simulate(job));
-  if (job.sheets) {
-    for (PlannedTask& sheet : Sheets(job, frames)) planned.push_back(std::move(sheet));
+  return planned;
+}
+
+JobSpec SpecOfOnto(const JobSpec& job) {
+  JobSpec spec = job;
+  spec.tessellate.capture = job.onto->capture;
+  spec.frames_per_second = job.onto->frames_per_second;
+  spec.template_frame = -1;
+  return spec;
+}
+
+/// The second take's tasks, so named that they are told from those of the first.
+std::vector<PlannedTask> NamedOnto(std::vector<PlannedTask> tasks) {
+  for (PlannedTask& task : tasks) {
+    task.name = OfOnto(task.name);
+    if (!task.output.empty()) task.output = "onto/" + task.output;
+    for (PlannedInput& input : task.inputs) {
+      if (!input.task.empty()) input.task = OfOnto(input.task);
+    }
   }
-  if (job.film) {
-    ASSIGN_OR_RETURN(std::vector<PlannedTask> film, Film(job, frames, std::string(kAssemble), job.effect.is_null() ? "" : SimulateName(job.effect)));
-    std::move(film.begin(), film.end(), std::back_inserter(planned));
+  return tasks;
+}
+
+}  // namespace
+
+std::int32_t InterpolatedMax(const JobSpec& job, std::int32_t frame_count) {
+  return job.interpolated_max >= 0 ? job.interpolated_max : frame_count / 10;
+}
+
+absl::StatusOr<std::vector<PlannedTask>> Plan(const JobSpec& job, const std::vector<PlannedFrame>& unordered, bool closed, const KnownTake& onto) {
+  ASSIGN_OR_RETURN(const std::vector<PlannedFrame> frames, Ordered(unordered));
+  if (job.window_frames < 1 || job.overlap_frames < 0 || job.overlap_frames >= job.window_frames) {
+    return absl::InvalidArgumentError(fmt::format("windows of {} frames cannot share {} with the next", job.window_frames, job.overlap_frames));
+  }
+  if (job.stretch_frames < 1) return absl::InvalidArgumentError(fmt::format("stretches of {} frames cannot be followed", job.stretch_frames));
+
+  ASSIGN_OR_RETURN(std::vector<PlannedTask> planned, PlanTracking(job, frames, closed));
+  std::vector<PlannedFrame> onto_frames;
+  if (job.onto) {
+    auto ordered = Ordered(onto.frames);
+    if (!ordered.ok()) return base::Annotate(ordered.status(), "the second take");
+    onto_frames = *std::move(ordered);
+    auto tracking = PlanTracking(SpecOfOnto(job), onto_frames, onto.closed);
+    if (!tracking.ok()) return base::Annotate(tracking.status(), "the second take");
+    Append(NamedOnto(*std::move(tracking)), planned);
+  }
+  const bool whole = closed && (!job.onto || onto.closed);
+  const bool simulated = whole && !job.effect.is_null();
+  if (simulated) planned.push_back(Simulate(job));
+  if (job.sheets && closed) Append(Sheets(job, frames), planned);
+  if (job.sheets && job.onto && onto.closed) Append(NamedOnto(Sheets(SpecOfOnto(job), onto_frames)), planned);
+  if (job.sheets && simulated) {
+    planned.push_back(Sheet(job, "simulated", {Result("simulated", SimulateName(job.effect)), Result("tracked", std::string(kAssemble))}));
+  }
+  if (job.film && whole) {
+    ASSIGN_OR_RETURN(std::vector<PlannedTask> film, Film(job, frames, std::string(kAssemble), simulated ? SimulateName(job.effect) : ""));
+    Append(std::move(film), planned);
   }
   return planned;
 }

@@ -21,6 +21,14 @@ struct PlannedFrame {
   std::string extension;
 };
 
+/// A second take, which an effect turns the job's own into (paper, section 6.3). It is cast and tracked with the job's options, but for what its own
+/// sequence says, and its template is chosen from its own frames.
+struct OntoTake {
+  std::string sequence;  // its id, by which the job finds its frames again
+  tasks::CaptureFrameOptions capture;
+  double frames_per_second = 25;
+};
+
 /// What a user asked for, checked and with defaults filled in.
 struct JobSpec {
   tasks::TessellateOptions tessellate;
@@ -35,6 +43,13 @@ struct JobSpec {
   nlohmann::json effect;  // null: tracking only
   bool sheets = true;
   std::optional<tasks::FilmOptions> film;
+  std::optional<OntoTake> onto;  // never without an effect
+};
+
+/// What is known of a take's frames. `closed`: no frame will follow.
+struct KnownTake {
+  std::vector<PlannedFrame> frames;
+  bool closed = false;
 };
 
 /// An input by name of the planned task that makes it; its digest is known when that task has ended.
@@ -58,8 +73,10 @@ struct PlannedTask {
 /// The tasks that can be named from the frames known so far. `closed`: no frame will follow, so everything can be named.
 /// Calling it again with more frames returns a superset: the same names with the same content. So the tasks of frames that have just arrived can be
 /// had by naming only those. The order is that in which a worker should take them; when a take is closed, what others wait for comes first.
+/// `onto`: of the job's second take, if it has one. Names of that take's tasks begin with "onto: ", names of its results with "onto/"; what needs
+/// both takes can be named once both are closed.
 /// FAILED_PRECONDITION for a closed take without frames or without the template frame that the job names.
-absl::StatusOr<std::vector<PlannedTask>> Plan(const JobSpec& job, const std::vector<PlannedFrame>& frames, bool closed);
+absl::StatusOr<std::vector<PlannedTask>> Plan(const JobSpec& job, const std::vector<PlannedFrame>& frames, bool closed, const KnownTake& onto = {});
 
 /// How many bad frames the job puts up with in a take of that many frames.
 std::int32_t InterpolatedMax(const JobSpec& job, std::int32_t frame_count);

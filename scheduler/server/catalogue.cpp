@@ -22,14 +22,20 @@ std::vector<plan::PlannedFrame> PlannedFrames(const std::vector<store::FrameAdde
   return planned;
 }
 
-std::vector<store::FrameAdded> AllFrames(const CatalogueSequence& sequence) {
-  std::vector<store::FrameAdded> frames;
-  for (const auto& [number, frame] : *sequence.frames) frames.push_back(frame);
-  return frames;
-}
-
 absl::StatusOr<plan::JobSpec> SpecOf(const CatalogueJob& job) {
   return plan::JobSpecFromJson(nlohmann::json::parse(job.added.spec_json, nullptr, false));
+}
+
+/// Empty for a job with one take, or none that can be read: planning it says so.
+std::string OntoOf(const CatalogueJob& job) {
+  const auto spec = SpecOf(job);
+  return spec.ok() && spec->onto ? spec->onto->sequence : "";
+}
+
+/// Frames of one of a job's sequences, for that of its takes that they belong to: for both, if they are the same.
+plan::KnownTake Added(const std::vector<store::FrameAdded>& frames, const std::string& sequence) {
+  if (frames.empty() || frames.front().sequence != sequence) return {};
+  return {.frames = PlannedFrames(frames)};
 }
 
 }  // namespace
@@ -40,24 +46,72 @@ void Catalogue::Plan(const CatalogueJob& job, std::optional<std::vector<store::F
   plannings_.insert(place, {.job = job.added.id, .priority = job.added.priority, .frames = std::move(frames)});
 }
 
+absl::StatusOr<plan::KnownTake> Catalogue::AllKnown(CatalogueSequence& sequence) const {
+  RETURN_IF_ERROR(NeedFrames(sequence));
+  std::vector<store::FrameAdded> frames;
+  for (const auto& [number, frame] : *sequence.frames) frames.push_back(frame);
+  return plan::KnownTake{.frames = PlannedFrames(frames), .closed = sequence.closed};
+}
+
 absl::Status Catalogue::Expand(Planning& planning) {
   const CatalogueJob& job = jobs_.at(planning.job);
   CatalogueSequence& sequence = sequences_.at(job.added.sequence);
   core::TasksAdded& added = planning.added.emplace(core::TasksAdded{.job = planning.job});
-  RETURN_IF_ERROR(NeedFrames(sequence));
-  const bool whole = !planning.frames;
-  added.complete = whole && sequence.closed;
   const auto spec = SpecOf(job);
-  auto planned = spec.ok() ? plan::Plan(*spec, PlannedFrames(whole ? AllFrames(sequence) : *planning.frames), added.complete)
-                           : absl::StatusOr<std::vector<plan::PlannedTask>>(spec.status());
+  if (!spec.ok()) {
+    added.impossible = std::string(spec.status().message());
+    return absl::OkStatus();
+  }
+  CatalogueSequence* onto_sequence = nullptr;
+  if (spec->onto) {
+    const auto found = sequences_.find(spec->onto->sequence);
+    if (found == sequences_.end()) {
+      added.impossible = fmt::format("its second take, sequence {}, is not on record", spec->onto->sequence);
+      return absl::OkStatus();
+    }
+    onto_sequence = &found->second;
+  }
+  plan::KnownTake take, onto;
+  if (planning.frames) {
+    take = Added(*planning.frames, job.added.sequence);
+    if (onto_sequence) onto = Added(*planning.frames, job.onto);
+  } else {
+    ASSIGN_OR_RETURN(take, AllKnown(sequence));
+    if (onto_sequence) {
+      ASSIGN_OR_RETURN(onto, AllKnown(*onto_sequence));
+    }
+  }
+  added.complete = take.closed && (!onto_sequence || onto.closed);
+  auto planned = plan::Plan(*spec, take.frames, take.closed, onto);
   if (!planned.ok()) {
     added.impossible = std::string(planned.status().message());
     return absl::OkStatus();
   }
-  if (spec->interpolated_max >= 0) added.bad_frames_max = spec->interpolated_max;
-  if (sequence.closed) added.bad_frames_max = plan::InterpolatedMax(*spec, static_cast<std::int32_t>(sequence.frame_count));
+  // Each take's own limit is kept where it is assembled; to stop early, the core counts the bad frames of both together.
+  const std::int32_t takes = onto_sequence ? 2 : 1;
+  if (spec->interpolated_max >= 0) added.bad_frames_max = takes * spec->interpolated_max;
+  if (sequence.closed && (!onto_sequence || onto_sequence->closed)) {
+    added.bad_frames_max = plan::InterpolatedMax(*spec, static_cast<std::int32_t>(sequence.frame_count));
+    if (onto_sequence) added.bad_frames_max += plan::InterpolatedMax(*spec, static_cast<std::int32_t>(onto_sequence->frame_count));
+  }
   added.tasks = *std::move(planned);
   return absl::OkStatus();
+}
+
+void Catalogue::Follow(const std::string& id) {
+  CatalogueJob& job = jobs_.at(id);
+  job.onto = OntoOf(job);
+  if (!sequences_.contains(job.onto)) job.onto.clear();
+  for (const std::string& sequence : {job.added.sequence, job.onto}) {
+    const auto found = sequences_.find(sequence);
+    if (found == sequences_.end()) continue;
+    if (std::ranges::find(found->second.jobs, id) == found->second.jobs.end()) found->second.jobs.push_back(id);
+  }
+}
+
+void Catalogue::Tidy(CatalogueSequence& sequence) const {
+  const bool unused = std::all_of(sequence.jobs.begin(), sequence.jobs.end(), [this](const std::string& other) { return jobs_.at(other).ended; });
+  if (sequence.closed && unused) sequence.frames.reset();
 }
 
 bool Catalogue::PlanSome(Turn& turn) {
@@ -129,10 +183,13 @@ absl::Status Catalogue::Restore(Turn& turn, store::Snapshot snapshot) {
     if (sequence == sequences_.end())
       return absl::DataLossError(fmt::format("job {} belongs to sequence {}, which is not on record", id, stored.added.sequence));
     CatalogueJob& job = jobs_[id];
-    job = {.added = std::move(stored.added), .ended = stored.ended, .paused = stored.paused, .ended_at = stored.ended_at};
+    job = {.added = std::move(stored.added), .ended = stored.ended, .paused = stored.paused, .ended_at = stored.ended_at, .onto = {}};
     job_order_.push_back(id);
-    sequence->second.jobs.push_back(id);
-    if (job.ended) continue;
+    if (job.ended) {
+      sequence->second.jobs.push_back(id);
+      continue;
+    }
+    Follow(id);
     core::JobSubmitted submitted = Submission(job);
     submitted.cancelled = stored.cancelled;
     submitted.failures = std::move(stored.failures);
@@ -220,6 +277,10 @@ absl::StatusOr<std::string> Catalogue::Submit(Turn& turn, const std::string& seq
   const auto found = sequences_.find(sequence_id);
   if (found == sequences_.end()) return FindSequence(sequence_id).status();
   RETURN_IF_ERROR(NeedFrames(found->second));
+  if (spec.onto) {
+    RETURN_IF_ERROR(FindSequence(spec.onto->sequence).status());
+    RETURN_IF_ERROR(NeedFrames(sequences_.at(spec.onto->sequence)));
+  }
   const std::string id = fmt::format("j{}", jobs_.size() + 1);
   CatalogueJob& job = jobs_[id];
   job.added = {.id = id,
@@ -230,7 +291,7 @@ absl::StatusOr<std::string> Catalogue::Submit(Turn& turn, const std::string& seq
                .terms = terms,
                .submitted = WallSeconds()};
   job_order_.push_back(id);
-  found->second.jobs.push_back(id);
+  Follow(id);
   turn.Record(job.added);
   turn.Apply(Submission(job));
   Plan(job);
@@ -247,10 +308,13 @@ absl::Status Catalogue::Retry(Turn& turn, const std::string& id) {
     turn.Apply(core::RetryJob{id});
     return absl::OkStatus();
   }
+  Follow(id);
   CatalogueSequence& sequence = sequences_.at(job.added.sequence);
-  if (const absl::Status status = NeedFrames(sequence); !status.ok()) {
+  absl::Status readable = NeedFrames(sequence);
+  if (const auto onto = sequences_.find(job.onto); readable.ok() && onto != sequences_.end()) readable = NeedFrames(onto->second);
+  if (!readable.ok()) {
     job = before;
-    return status;
+    return readable;
   }
   turn.Record(core::Record(core::JobRetried{id}));
   core::JobSubmitted submitted = Submission(job);
@@ -268,9 +332,8 @@ void Catalogue::NoteEnd(const std::string& id, double at) {
 void Catalogue::End(const std::string& id) {
   CatalogueJob& job = jobs_.at(id);
   job.ended = true;
-  CatalogueSequence& sequence = sequences_.at(job.added.sequence);
-  const bool unused = std::all_of(sequence.jobs.begin(), sequence.jobs.end(), [this](const std::string& other) { return jobs_.at(other).ended; });
-  if (sequence.closed && unused) sequence.frames.reset();
+  Tidy(sequences_.at(job.added.sequence));
+  if (const auto onto = sequences_.find(job.onto); onto != sequences_.end()) Tidy(onto->second);
 }
 
 absl::StatusOr<const CatalogueSequence*> Catalogue::FindSequence(const std::string& id) const {

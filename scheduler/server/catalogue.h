@@ -28,6 +28,7 @@ struct CatalogueJob {
   bool ended = false;  // on record; the core may have forgotten it
   bool paused = false;
   double ended_at = 0;  // seconds since 1970; 0: not yet, or not noted
+  std::string onto;     // its second take's sequence, if it has one; known while the job goes on
 };
 
 /// The sequences and jobs that there are, and what follows for the core from each change of them. Touched only inside turns.
@@ -46,7 +47,7 @@ class Catalogue {
   absl::StatusOr<const CatalogueSequence*> Open(Turn& turn, store::SequenceOpened asked);
   absl::StatusOr<const CatalogueSequence*> Add(Turn& turn, const std::string& sequence, std::vector<store::FrameAdded> frames);
   absl::StatusOr<const CatalogueSequence*> Close(Turn& turn, const std::string& sequence);
-  /// Returns the job's id.
+  /// A second take of the spec is known to be there. Returns the job's id.
   absl::StatusOr<std::string> Submit(Turn& turn, const std::string& sequence, const std::string& user, std::int32_t priority, plan::JobSpec spec,
                                      const core::JobTerms& terms = {});
   absl::Status Retry(Turn& turn, const std::string& job);
@@ -82,13 +83,19 @@ class Catalogue {
   struct Planning {
     std::string job;
     std::int32_t priority = 0;
-    std::optional<std::vector<store::FrameAdded>> frames;  // which have been added; nothing: all of the sequence's
+    std::optional<std::vector<store::FrameAdded>> frames;  // which have been added to one sequence; nothing: all of the job's sequences
     std::optional<core::TasksAdded> added;                 // once planned: what the core has not been told yet, in `tasks` from `next`
     std::size_t next = 0;
   };
   void Plan(const CatalogueJob& job, std::optional<std::vector<store::FrameAdded>> frames = std::nullopt);
   absl::Status Expand(Planning& planning);
   absl::Status NeedFrames(CatalogueSequence& sequence) const;
+  /// Loads them if need be.
+  absl::StatusOr<plan::KnownTake> AllKnown(CatalogueSequence& sequence) const;
+  /// Has the job told of whatever is added to its sequences.
+  void Follow(const std::string& job);
+  /// Forgets the frames where nobody needs them any more.
+  void Tidy(CatalogueSequence& sequence) const;
 
   store::Store& store_;
   std::map<std::string, CatalogueSequence> sequences_;

@@ -58,6 +58,12 @@ absl::StatusOr<v1::Job> JobMessage(const core::State& state, const Catalogue& ca
   message.set_sequence_id(job.added.sequence);
   message.set_sequence_name((*sequence)->opened.name);
   message.set_sequence_closed((*sequence)->closed);
+  if (!job.onto.empty()) {
+    const auto onto = catalogue.FindSequence(job.onto);
+    VOROCAST_CHECK(onto.ok());
+    message.set_onto_sequence_name((*onto)->opened.name);
+    message.set_sequence_closed((*sequence)->closed && (*onto)->closed);
+  }
   message.set_user(job.added.user);
   message.set_state(StateOf(view.phase));
   message.set_seconds_left(view.seconds_left);

@@ -109,6 +109,7 @@ absl::StatusOr<plan::JobSpec> SpecOf(const v1::SubmitJobRequest& request) {
     ASSIGN_OR_RETURN(spec.film, FilmOf(request.film()));
   }
   ASSIGN_OR_RETURN(spec.effect, EffectOf(request.effect_json()));
+  RETURN_IF_ERROR(simulation::CheckSecondTake(spec.effect, !request.onto_sequence_id().empty()));
   // The tasks' own checks know the choices.
   tasks::TessellateOptions checked;
   RETURN_IF_ERROR(tasks::FromJson(tasks::ToJson(spec.tessellate), checked));
@@ -138,6 +139,12 @@ absl::Status SetLimits(const v1::RetryJobRequest& request, core::JobTerms& terms
 void SetCapture(const store::SequenceOpened& sequence, plan::JobSpec& spec) {
   spec.tessellate.capture = {.metres_per_unit = sequence.metres_per_unit, .up = sequence.up};
   spec.frames_per_second = sequence.frames_per_second;
+}
+
+void SetOnto(const store::SequenceOpened& sequence, plan::JobSpec& spec) {
+  spec.onto = {.sequence = sequence.id,
+               .capture = {.metres_per_unit = sequence.metres_per_unit, .up = sequence.up},
+               .frames_per_second = sequence.frames_per_second};
 }
 
 }  // namespace vorocast::server

@@ -19,5 +19,7 @@ absl::Status SetLimits(const v1::RetryJobRequest& request, core::JobTerms& terms
 
 /// The capture's units, axis and rate.
 void SetCapture(const store::SequenceOpened& sequence, plan::JobSpec& spec);
+/// The second take, with its own units, axis and rate.
+void SetOnto(const store::SequenceOpened& sequence, plan::JobSpec& spec);
 
 }  // namespace vorocast::server

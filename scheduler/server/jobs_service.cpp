@@ -69,6 +69,11 @@ grpc::ServerUnaryReactor* JobsService::Submit(grpc::CallbackServerContext* conte
         plan::JobSpec whole = asked;
         ASSIGN_OR_RETURN(const CatalogueSequence* sequence, catalogue_.FindSequence(request->sequence_id()));
         SetCapture(sequence->opened, whole);
+        if (!request->onto_sequence_id().empty()) {
+          const auto onto = catalogue_.FindSequence(request->onto_sequence_id());
+          if (!onto.ok()) return base::Annotate(onto.status(), "onto_sequence_id");
+          SetOnto((*onto)->opened, whole);
+        }
         ASSIGN_OR_RETURN(const std::string id,
                          catalogue_.Submit(turn, request->sequence_id(), request->user(), request->priority(), std::move(whole), terms));
         spdlog::info("job submitted: job={} sequence={} take=\"{}\" user=\"{}\" priority={}", id, request->sequence_id(), sequence->opened.name,

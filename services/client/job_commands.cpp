@@ -3,6 +3,7 @@
 #include <cstdlib>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -45,6 +46,7 @@ void AddSubmit(CLI::App& program, int& exit_code) {
   struct Flags {
     std::string folder, session = "default";
     CaptureFlags capture;
+    OntoFlags onto;
     JobFlags job;
     SchedulerFlags scheduler;
     FollowOptions follow;
@@ -55,6 +57,7 @@ void AddSubmit(CLI::App& program, int& exit_code) {
   command.add_option("capture", flags->folder, "Folder with one file a frame: PLY, OBJ, OFF or Draco")->required();
   command.add_option("--session", flags->session, "Recording day the take belongs to")->capture_default_str();
   flags->capture.AddTo(command);
+  flags->onto.AddTo(command);
   flags->job.AddTo(command);
   flags->scheduler.AddTo(command);
   command.add_flag("--watch", flags->watch, "Stay and show the job as it goes on");
@@ -72,9 +75,18 @@ void AddSubmit(CLI::App& program, int& exit_code) {
   command.callback([flags, &exit_code] {
     const auto submit = [&]() -> absl::Status {
       ASSIGN_OR_RETURN(const capture::CaptureOptions options, flags->capture.Parse());
-      ASSIGN_OR_RETURN(const v1::SubmitJobRequest request, flags->job.Parse());
+      ASSIGN_OR_RETURN(v1::SubmitJobRequest request, flags->job.Parse());
+      ASSIGN_OR_RETURN(const std::optional<capture::Capture> onto, flags->onto.Open(request));
+      if (onto) RETURN_IF_ERROR(CheckCapture(*onto));
       ASSIGN_OR_RETURN(SchedulerClient client, flags->scheduler.Connect());
       CatchInterrupts();
+      if (onto) {
+        PercentView view("Frames of the second take");
+        ASSIGN_OR_RETURN(const v1::Sequence second, client.Upload(
+                                                        *onto, flags->session, [&](double fraction) { view.Show(fraction); }, Interrupted));
+        view.Finish();
+        request.set_onto_sequence_id(second.id());
+      }
       ASSIGN_OR_RETURN(const v1::Job job, SendTake(client, flags->folder, options, flags->session, request, flags->follow));
       if (!flags->watch) return absl::OkStatus();
       return FollowToItsEnd(client, job.id());
@@ -98,7 +110,7 @@ void AddStatus(CLI::App& program, int& exit_code) {
       ASSIGN_OR_RETURN(const v1::ListJobsReply list, client.ListAll(50, ""));
       fmt::print("{}", DescribeFleet(list.fleet(), absl::LocalTimeZone()));
       if (list.jobs().empty()) fmt::print("No jobs\n");
-      for (const v1::Job& job : list.jobs()) fmt::print("{}  {:<24} {:<12} {}\n", job.id(), job.sequence_name(), job.user(), DescribeJobLine(job));
+      for (const v1::Job& job : list.jobs()) fmt::print("{}  {:<24} {:<12} {}\n", job.id(), TakesOf(job), job.user(), DescribeJobLine(job));
       return absl::OkStatus();
     };
     SetExitCode(exit_code, status());

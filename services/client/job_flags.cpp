@@ -57,6 +57,26 @@ void CaptureFlags::AddTo(CLI::App& command) {
   command.add_option("--components", components, "Bodies expected, for a warning only: 2 for a dancer with a cage")->check(CLI::NonNegativeNumber);
 }
 
+void OntoFlags::AddTo(CLI::App& command) {
+  command.add_option("--onto", folder, "Folder of a second take, which an effect with a morph turns this one into (--effect morph)");
+  command.add_option("--onto-units", capture.units, "Unit of the second take's files (its capture.json, or m)");
+  command.add_option("--onto-up", capture.up, "Axis of the second take's files that points up (its capture.json, or y)");
+  command.add_option("--onto-fps", capture.frames_per_second, "Frames a second of the second take (its capture.json, or 25)")
+      ->check(CLI::Range(1.0, 1000.0));
+  command.add_option("--onto-name", capture.name, "Name of the second take (its capture.json, or the folder's name)");
+  command.add_option("--onto-frames", capture.frames, "Only these frames of the second take, as FIRST:END");
+}
+
+absl::StatusOr<std::optional<capture::Capture>> OntoFlags::Open(const v1::SubmitJobRequest& request) const {
+  const nlohmann::json effect = request.effect_json().empty() ? nlohmann::json() : nlohmann::json::parse(request.effect_json(), nullptr, false);
+  RETURN_IF_ERROR(simulation::CheckSecondTake(effect, !folder.empty()));
+  if (folder.empty()) return std::nullopt;
+  auto options = capture.Parse();
+  if (!options.ok()) return base::Annotate(options.status(), "the second take");
+  ASSIGN_OR_RETURN(capture::Capture opened, capture::OpenCapture(folder, *options));
+  return opened;
+}
+
 absl::Status ParseFrameRange(const std::string& text, capture::CaptureOptions& options) {
   const auto wrong = [&] {
     return absl::InvalidArgumentError(fmt::format("--frames {}: write FIRST:END, for example 0:60 for the first sixty frames", text));

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include <CLI/CLI.hpp>
@@ -20,6 +21,16 @@ struct CaptureFlags {
 
   void AddTo(CLI::App& command);
   absl::StatusOr<capture::CaptureOptions> Parse() const;
+};
+
+/// --onto, --onto-units, …: the second take that an effect with a morph turns the first into.
+struct OntoFlags {
+  std::string folder;
+  CaptureFlags capture;
+
+  void AddTo(CLI::App& command);
+  /// Nothing when no second take is named. INVALID_ARGUMENT when the request's effect needs one and there is none, or has no use for one.
+  absl::StatusOr<std::optional<capture::Capture>> Open(const v1::SubmitJobRequest& request) const;
 };
 
 /// --cells, --iterations, --patches, --template, --window, --effect, …: what is to be computed.

@@ -58,8 +58,12 @@ std::string FormatDuration(double seconds) {
 
 bool HasEnded(const v1::Job& job) { return job.state() == v1::DONE || job.state() == v1::FAILED || job.state() == v1::CANCELLED; }
 
+std::string TakesOf(const v1::Job& job) {
+  return job.onto_sequence_name().empty() ? job.sequence_name() : fmt::format("{} onto {}", job.sequence_name(), job.onto_sequence_name());
+}
+
 std::string DescribeJob(const v1::Job& job) {
-  std::string text = fmt::format("{} ({}): {}", job.sequence_name(), job.id(), StateText(job));
+  std::string text = fmt::format("{} ({}): {}", TakesOf(job), job.id(), StateText(job));
   if (!HasEnded(job) && job.seconds_left() >= 0) text += fmt::format(", about {} left", FormatDuration(job.seconds_left()));
   text += "\n";
   for (const v1::Stage& stage : job.stages()) text += DescribeStage(stage);

@@ -11,6 +11,9 @@ namespace vorocast::client {
 /// "1:23:45", "2:05", or "0:07"; "–" when negative (not known yet).
 std::string FormatDuration(double seconds);
 
+/// The job's take, and the second one if it has two: "dance onto walk".
+std::string TakesOf(const v1::Job& job);
+
 /// A table of the job's stages with a bar each, failures below, and the time left: what `status` and `watch` print.
 std::string DescribeJob(const v1::Job& job);
 

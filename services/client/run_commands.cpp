@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include <memory>
+#include <optional>
 
 #include <fmt/format.h>
 
@@ -32,6 +33,7 @@ void AddRun(CLI::App& program, int& exit_code) {
   struct Flags {
     std::string folder;
     CaptureFlags capture;
+    OntoFlags onto;
     JobFlags job;
     PlaceFlags place;
   };
@@ -39,17 +41,20 @@ void AddRun(CLI::App& program, int& exit_code) {
   CLI::App& command = *program.add_subcommand("run", "Do the whole job on this machine: frames in, cells, tracked take, effect and pictures out");
   command.add_option("capture", flags->folder, "Folder with one file a frame: PLY, OBJ, OFF or Draco")->required();
   flags->capture.AddTo(command);
+  flags->onto.AddTo(command);
   flags->job.AddTo(command);
   flags->place.AddTo(command);
   command.footer(
       "Stopped or killed, the same command goes on where it was. Another effect on the same take computes only the effect.\n"
-      "Example: vorocast run take1 --units cm --up -y --fps 30 --effect pendulum --out take1-pendulum");
+      "Example: vorocast run take1 --units cm --up -y --fps 30 --effect pendulum --out take1-pendulum\n"
+      "Two takes: vorocast run take1 --onto take2 --effect morph --out take1-morph");
   command.callback([flags, &exit_code] {
     const auto run = [&]() -> absl::StatusOr<int> {
       ASSIGN_OR_RETURN(const capture::CaptureOptions options, flags->capture.Parse());
       ASSIGN_OR_RETURN(const v1::SubmitJobRequest request, flags->job.Parse());
+      ASSIGN_OR_RETURN(const std::optional<capture::Capture> onto, flags->onto.Open(request));
       ASSIGN_OR_RETURN(const capture::Capture capture, capture::OpenCapture(flags->folder, options));
-      return RunJob(capture, request, flags->place.Parse(capture.name));
+      return RunJob(capture, onto ? &*onto : nullptr, request, flags->place.Parse(capture.name));
     };
     const auto code = run();
     exit_code = code.ok() ? *code : PrintError(code.status());
@@ -71,6 +76,7 @@ void AddDemo(CLI::App& program, int& exit_code) {
   command.callback([flags, &exit_code] {
     const auto demo = [&]() -> absl::StatusOr<int> {
       ASSIGN_OR_RETURN(const v1::SubmitJobRequest request, flags->job.Parse());
+      RETURN_IF_ERROR(OntoFlags{}.Open(request).status());  // the made-up capture is one take
       const RunOptions place = flags->place.Parse("demo");
       const std::filesystem::path folder = place.out / fmt::format("capture-{}", flags->frames);
       synth::SynthOptions options;
@@ -85,7 +91,7 @@ void AddDemo(CLI::App& program, int& exit_code) {
         view.Finish();
       }
       ASSIGN_OR_RETURN(const capture::Capture capture, capture::OpenCapture(folder, {}));
-      const int code = RunJob(capture, request, place);
+      const int code = RunJob(capture, nullptr, request, place);
       if (code == 0) {
         fmt::print("\nLook at {0}/sheets/: points.png, cells.png, tracked.png, simulated.png\n",
                    std::filesystem::absolute(place.out).lexically_normal().string());

@@ -92,6 +92,14 @@ absl::StatusOr<v1::Job> FollowJob(EmbeddedService& service, std::unique_ptr<Sche
   }
 }
 
+absl::StatusOr<v1::Sequence> UploadTake(SchedulerClient& client, const capture::Capture& capture, const std::string& title) {
+  PercentView view(title);
+  ASSIGN_OR_RETURN(v1::Sequence sequence, client.Upload(
+                                              capture, SessionOf(capture), [&](double fraction) { view.Show(fraction); }, Interrupted));
+  view.Finish();
+  return sequence;
+}
+
 /// XDMF beside the takes, for ParaView.
 absl::Status WriteXdmfBeside(const std::filesystem::path& folder) {
   const std::filesystem::path tracked = folder / "tracked.h5";
@@ -107,10 +115,10 @@ void PrintResults(const v1::Job& job, const std::filesystem::path& out, double s
   // One line for what is one file a frame.
   const auto in_folder = [](const std::string& folder) { return [folder](const v1::Output& output) { return output.name().starts_with(folder); }; };
   for (const v1::Output& output : job.outputs()) {
-    if (in_folder("cells/")(output) || in_folder("film/")(output)) continue;
+    if (in_folder("cells/")(output) || in_folder("film/")(output) || in_folder("onto/cells/")(output)) continue;
     fmt::print("  {:<24} {:>8.1f} MB\n", output.name(), static_cast<double>(output.size()) / 1e6);
   }
-  for (const std::string folder : {"cells/", "film/"}) {
+  for (const std::string folder : {"cells/", "film/", "onto/cells/"}) {
     if (const auto count = std::ranges::count_if(job.outputs(), in_folder(folder)); count > 0) fmt::print("  {:<24} {} files\n", folder, count);
   }
 }
@@ -153,9 +161,12 @@ absl::Status FetchOutputs(SchedulerClient& client, const v1::Job& job, const std
   return WriteXdmfBeside(folder);
 }
 
-int RunJob(const capture::Capture& capture, v1::SubmitJobRequest request, const RunOptions& options) {
+int RunJob(const capture::Capture& capture, const capture::Capture* onto, v1::SubmitJobRequest request, const RunOptions& options) {
   const auto started = std::chrono::steady_clock::now();
   if (const absl::Status status = CheckCapture(capture); !status.ok()) return PrintError(status);
+  if (onto != nullptr) {
+    if (const absl::Status status = CheckCapture(*onto); !status.ok()) return PrintError(status);
+  }
   CatchInterrupts();
 
   fmt::print("State folder: {}\n", options.state.string());
@@ -166,13 +177,14 @@ int RunJob(const capture::Capture& capture, v1::SubmitJobRequest request, const 
     if (const absl::Status status = CancelAbandonedJobs(*client); !status.ok()) return PrintError(status);
   }
 
-  PercentView upload_view("Frames");
-  const auto sequence = client->Upload(
-      capture, SessionOf(capture), [&](double fraction) { upload_view.Show(fraction); }, Interrupted);
+  const auto sequence = UploadTake(*client, capture, "Frames");
   if (!sequence.ok()) return PrintError(sequence.status());
-  upload_view.Finish();
-
   request.set_sequence_id(sequence->id());
+  if (onto != nullptr) {
+    const auto second = UploadTake(*client, *onto, "Frames of the second take");
+    if (!second.ok()) return PrintError(second.status());
+    request.set_onto_sequence_id(second->id());
+  }
   const auto job = FollowJob(*service, client, request);
   if (!job.ok()) return PrintError(job.status());
 

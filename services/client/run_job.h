@@ -16,9 +16,10 @@ struct RunOptions {
   std::int32_t workers = 0;
 };
 
-/// The whole job on this machine: service up, frames in, progress shown, results fetched to `out`, service down. Goes on through a
-/// scheduler's death; stopped by Ctrl-C, and taken up again by the same call. Prints where the results are. Returns the exit code.
-int RunJob(const capture::Capture& capture, v1::SubmitJobRequest request, const RunOptions& options);
+/// The whole job on this machine (`onto`: and its second take, or null): service up, frames in, progress shown, results fetched to `out`, service
+/// down. Goes on through a scheduler's death; stopped by Ctrl-C, and taken up again by the same call. Prints where the results are. Returns the exit
+/// code.
+int RunJob(const capture::Capture& capture, const capture::Capture* onto, v1::SubmitJobRequest request, const RunOptions& options);
 
 /// Fetches all outputs of a job that exist into a folder, with progress.
 absl::Status FetchOutputs(SchedulerClient& client, const v1::Job& job, const std::filesystem::path& folder);

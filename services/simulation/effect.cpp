@@ -69,6 +69,19 @@ absl::StatusOr<json> ParseEffect(std::string_view text) {
   return NormaliseEffect(effect);
 }
 
+absl::Status CheckSecondTake(const json& effect, bool has_second_take) {
+  const bool morphs = effect.is_object() && effect.contains("morph") && effect["morph"].is_object();
+  if (morphs == has_second_take) return absl::OkStatus();
+  const std::string name = effect.is_object() ? effect.value("name", "") : "";
+  if (morphs) {
+    return absl::InvalidArgumentError(fmt::format(
+        "effect \"{}\" turns the take into a second one, and none was given: name that take too (--onto FOLDER; onto_sequence_id)", name));
+  }
+  return absl::InvalidArgumentError(
+      fmt::format("a second take was given, and {} has no use for it: choose an effect with a morph (--effect morph), or leave the second take out",
+                  effect.is_object() ? fmt::format("effect \"{}\"", name) : "a job without an effect"));
+}
+
 absl::StatusOr<json> LoadEffect(const std::string& name_or_path) {
   for (const EmbeddedFile& effect : EmbeddedEffects()) {
     if (effect.name == name_or_path) return ParseEffect(effect.text);

@@ -203,6 +203,120 @@ TEST(Plan, OptionsAreWhatTheTasksAccept) {
   }
 }
 
+JobSpec Morphing() {
+  JobSpec job = Small();
+  job.effect = {{"name", "morph"}};
+  job.tessellate.capture = {.metres_per_unit = 1, .up = "+y"};
+  job.frames_per_second = 25;
+  job.onto = OntoTake{.sequence = "s2", .capture = {.metres_per_unit = 0.01, .up = "-z"}, .frames_per_second = 50};
+  return job;
+}
+
+/// Frames of the second take: other numbers, other files.
+std::vector<PlannedFrame> OntoFrames(std::int32_t count) {
+  std::vector<PlannedFrame> frames;
+  for (std::int32_t i = 100; i < 100 + count; ++i)
+    frames.push_back({.number = i, .blob = base::HashBytes(fmt::format("other frame {}", i)), .extension = ".obj"});
+  return frames;
+}
+
+std::vector<PlannedTask> PlannedOnto(const JobSpec& job, const KnownTake& take, const KnownTake& onto) {
+  auto tasks = Plan(job, take.frames, take.closed, onto);
+  EXPECT_TRUE(tasks.ok()) << tasks.status();
+  return tasks.ok() ? *std::move(tasks) : std::vector<PlannedTask>{};
+}
+
+TEST(PlanOnto, DrawsBothTakesOfAMorph) {
+  JobSpec job = Morphing();
+  job.sheets = false;
+  EXPECT_EQ(Draw(PlannedOnto(job, {Take(1), true}, {OntoFrames(2), true})),
+            "frame 0: tessellate <- frame=#0 -> cells/frame_000000.h5\n"
+            "template <- frame=#0 cells=[frame 0: tessellate] -> template.h5\n"
+            "guide <- template=template cells=[frame 0: tessellate]\n"
+            "window 0-0: track <- template=template guide=guide cells=[frame 0: tessellate]\n"
+            "assemble <- template=template window=window 0-0: track -> tracked.h5\n"
+            "onto: frame 100: tessellate <- frame=#100 -> onto/cells/frame_000100.h5\n"
+            "onto: frame 101: tessellate <- frame=#101 -> onto/cells/frame_000101.h5\n"
+            "onto: template <- frame=#100 frame=#101 cells=[onto: frame 100: tessellate] cells=[onto: frame 101: tessellate] -> onto/template.h5\n"
+            "onto: guide <- template=onto: template cells=[onto: frame 100: tessellate] cells=[onto: frame 101: tessellate]\n"
+            "onto: window 100-101: track <- template=onto: template guide=onto: guide cells=[onto: frame 100: tessellate] cells=[onto: frame 101: "
+            "tessellate]\n"
+            "onto: assemble <- template=onto: template window=onto: window 100-101: track -> onto/tracked.h5\n"
+            "morph: simulate <- tracked=assemble target=onto: assemble -> simulated.h5\n");
+}
+
+TEST(PlanOnto, EachTakeHasItsOwnUnitsAxisAndRateAndTheSecondItsOwnTemplate) {
+  JobSpec job = Morphing();
+  job.template_frame = 1;
+  std::map<std::string, PlannedTask> tasks;
+  for (PlannedTask& task : PlannedOnto(job, {Take(3), true}, {OntoFrames(3), true})) tasks.emplace(task.name, std::move(task));
+  EXPECT_EQ(tasks.at("frame 2: tessellate").options["capture"]["metres_per_unit"], 1);
+  EXPECT_EQ(tasks.at("onto: frame 102: tessellate").options["capture"]["metres_per_unit"], 0.01);
+  EXPECT_EQ(tasks.at("onto: frame 102: tessellate").options["capture"]["up"], "-z");
+  EXPECT_EQ(tasks.at("onto: points: sheet").options["capture"]["up"], "-z");
+  EXPECT_EQ(tasks.at("assemble").options["frames_per_second"], 25);
+  EXPECT_EQ(tasks.at("onto: assemble").options["frames_per_second"], 50);
+  EXPECT_EQ(tasks.at("template").options["frame"], 1);
+  EXPECT_EQ(tasks.at("onto: template").options["frame"], -1);
+  EXPECT_EQ(tasks.at("onto: template").options["tessellate"]["capture"]["up"], "-z");
+}
+
+TEST(PlanOnto, SheetsShowBothTakesAndTheMorphOnce) {
+  std::set<std::string> outputs;
+  for (const PlannedTask& task : PlannedOnto(Morphing(), {Take(2), true}, {OntoFrames(2), true})) {
+    if (task.kind == tasks::Kind::kSheet) outputs.insert(task.output);
+  }
+  EXPECT_EQ(outputs, (std::set<std::string>{"sheets/points.png", "sheets/cells.png", "sheets/tracked.png", "sheets/simulated.png",
+                                            "onto/sheets/points.png", "onto/sheets/cells.png", "onto/sheets/tracked.png"}));
+}
+
+/// Whichever take arrives first, and in whatever portions: what was named once stays as it was, and every input is there before it is read.
+TEST(PlanOnto, MoreFramesOfEitherTakeGiveASuperset) {
+  JobSpec job = Morphing();
+  job.film.emplace();
+  const std::vector<PlannedFrame> first = Take(6);
+  const std::vector<PlannedFrame> second = OntoFrames(5);
+  const std::string whole = Draw(PlannedOnto(job, {first, true}, {second, true}));
+  const auto part = [](const std::vector<PlannedFrame>& take, std::size_t known, bool closed) {
+    return KnownTake{{take.begin(), take.begin() + static_cast<std::ptrdiff_t>(known)}, closed};
+  };
+  for (std::size_t a = 0; a <= first.size() + 1; ++a) {
+    for (std::size_t b = 0; b <= second.size() + 1; ++b) {
+      const bool a_closed = a > first.size();
+      const bool b_closed = b > second.size();
+      std::set<std::string> known;
+      for (const PlannedTask& task :
+           PlannedOnto(job, part(first, std::min(a, first.size()), a_closed), part(second, std::min(b, second.size()), b_closed))) {
+        ASSERT_NE(whole.find(Draw({task})), std::string::npos) << task.name;
+        for (const PlannedInput& input : task.inputs) EXPECT_TRUE(input.task.empty() || known.contains(input.task)) << task.name;
+        EXPECT_TRUE(known.insert(task.name).second) << task.name;
+      }
+      EXPECT_EQ(known.contains("assemble"), a_closed);
+      EXPECT_EQ(known.contains("onto: assemble"), b_closed);
+      EXPECT_EQ(known.contains("morph: simulate"), a_closed && b_closed);
+      EXPECT_EQ(known.contains("film: encode"), a_closed && b_closed);
+    }
+  }
+}
+
+TEST(PlanOnto, SaysWhichTakeIsWrong) {
+  EXPECT_THAT(std::string(Plan(Morphing(), Take(2), true, {{}, true}).status().message()), HasSubstr("second take"));
+  EXPECT_THAT(std::string(Plan(Morphing(), {}, true, {OntoFrames(2), true}).status().message()), testing::Not(HasSubstr("second take")));
+}
+
+TEST(JobSpec, TheSecondTakeComesBackFromJson) {
+  const auto back = JobSpecFromJson(nlohmann::json::parse(ToJson(Morphing()).dump()));
+  ASSERT_TRUE(back.ok()) << back.status();
+  ASSERT_TRUE(back->onto.has_value());
+  EXPECT_EQ(back->onto->sequence, "s2");
+  EXPECT_EQ(back->onto->capture.metres_per_unit, 0.01);
+  EXPECT_EQ(back->onto->capture.up, "-z");
+  EXPECT_EQ(back->onto->frames_per_second, 50);
+  nlohmann::json broken = ToJson(Morphing());
+  broken["onto"] = "s2";
+  EXPECT_THAT(std::string(JobSpecFromJson(broken).status().message()), HasSubstr("onto"));
+}
+
 TEST(JobSpec, ComesBackFromJson) {
   JobSpec job = Small();
   job.tessellate.capture = {.metres_per_unit = 0.01, .up = "+z"};

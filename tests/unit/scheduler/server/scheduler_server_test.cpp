@@ -65,10 +65,10 @@ class SchedulerServerTest : public testing::Test {
     return reply;
   }
 
-  absl::StatusOr<v1::Sequence> Open(double frames_per_second = 25) {
+  absl::StatusOr<v1::Sequence> Open(double frames_per_second = 25, const std::string& name = "take 1") {
     v1::OpenSequenceRequest request;
     request.set_session("monday");
-    request.set_name("take 1");
+    request.set_name(name);
     request.set_frames_per_second(frames_per_second);
     request.set_metres_per_unit(0.01);
     request.set_up("+y");
@@ -386,6 +386,94 @@ TEST_F(SchedulerServerTest, ARetryMakesLostAndDamagedResultsAgain) {
   ASSERT_TRUE(Await([&] { return worker_->executed()["frame 3: tessellate"] == 2; }));
   EXPECT_EQ(WatchToEnd(job->id())->state(), v1::DONE);
   EXPECT_EQ(worker_->executed()["frame 0: tessellate"], 1);
+}
+
+TEST_F(SchedulerServerTest, AMorphWaitsForBothTakesAndGoesOnAfterARestart) {
+  StartWorker({.holds = [](const std::string& label) { return label == "onto: frame 22: tessellate"; }});
+  const auto first = Open();
+  const auto second = Open(50, "take 2");
+  ASSERT_NE(first->id(), second->id());
+  const auto morph = [&](v1::SubmitJobRequest& r) {
+    r.set_effect_json(R"({"name": "morph", "morph": {}})");
+    r.set_onto_sequence_id(second->id());
+  };
+  const auto job = Submit(first->id(), morph);
+  ASSERT_TRUE(job.ok()) << job.status();
+  EXPECT_EQ(job->onto_sequence_name(), "take 2");
+  // Frames of both are worked on while they arrive.
+  ASSERT_TRUE(AddFrames(first->id(), 0, 3).ok());
+  ASSERT_TRUE(AddFrames(second->id(), 20, 22).ok());
+  ASSERT_TRUE(Await([&] { return Get(job->id())->stages(0).done() == 5; }));
+  ASSERT_TRUE(Close(first->id()).ok());
+  ASSERT_TRUE(Await([&] { return worker_->executed().contains("tracked: sheet"); }));
+  EXPECT_FALSE(Get(job->id())->sequence_closed());
+  server_.reset();
+  StartScheduler();
+  ASSERT_TRUE(Await([&] {
+    const auto now = Get(job->id());
+    return now->stages_size() > 0 && now->stages(0).done() == 5;
+  }));
+  EXPECT_EQ(Get(job->id())->onto_sequence_name(), "take 2");
+  // What the scheduler has read from its store still follows both takes.
+  ASSERT_TRUE(AddFrames(second->id(), 22, 24).ok());
+  ASSERT_TRUE(Close(second->id()).ok());
+  ASSERT_TRUE(Await([&] { return worker_->executed().contains("onto: frame 23: tessellate"); }));
+  worker_->Release();
+  const auto ended = WatchToEnd(job->id());
+  ASSERT_TRUE(ended.ok()) << ended.status();
+  EXPECT_EQ(ended->state(), v1::DONE) << ended->DebugString();
+  for (const auto& [label, times] : worker_->executed()) EXPECT_EQ(times, 1) << label;
+  EXPECT_EQ(*Fetch(job->id(), "tracked.h5"), "assemble");
+  EXPECT_EQ(*Fetch(job->id(), "onto/tracked.h5"), "onto: assemble");
+  EXPECT_EQ(*Fetch(job->id(), "simulated.h5"), "morph: simulate");
+
+  // On record like any other, and a retry finds both takes again.
+  server_.reset();
+  StartScheduler();
+  EXPECT_EQ(Get(job->id())->SerializeAsString(), ended->SerializeAsString());
+  std::filesystem::remove(artifacts_->ArtifactPath(*base::Digest::FromHex(ended->outputs(ended->outputs_size() - 1).key()), ".png"));
+  v1::RetryJobRequest retry;
+  retry.set_job_id(job->id());
+  ASSERT_TRUE((Call<v1::Jobs::StubInterface>(*jobs_, &v1::Jobs::StubInterface::Retry, retry).ok()));
+  const auto again = WatchToEnd(job->id());
+  EXPECT_EQ(again->state(), v1::DONE) << again->DebugString();
+  EXPECT_EQ(again->outputs_size(), ended->outputs_size());
+  EXPECT_EQ(again->onto_sequence_name(), "take 2");
+}
+
+TEST_F(SchedulerServerTest, ATakeMayTurnIntoItself) {
+  StartWorker();
+  const auto sequence = Open();
+  const auto job = Submit(sequence->id(), [&](auto& r) {
+    r.set_effect_json(R"({"name": "morph", "morph": {"target_start_s": 1}})");
+    r.set_onto_sequence_id(sequence->id());
+  });
+  ASSERT_TRUE(job.ok()) << job.status();
+  ASSERT_TRUE(AddFrames(sequence->id(), 0, 3).ok());
+  ASSERT_TRUE(Await([&] { return Get(job->id())->stages_size() > 0 && Get(job->id())->stages(0).done() == 6; }));
+  ASSERT_TRUE(Close(sequence->id()).ok());
+  EXPECT_EQ(WatchToEnd(job->id())->state(), v1::DONE);
+}
+
+TEST_F(SchedulerServerTest, AMorphAndASecondTakeNeedEachOther) {
+  const auto first = Open();
+  const auto second = Open(25, "take 2");
+  const auto refused = [&](const char* effect, const std::string& onto) {
+    return Submit(first->id(),
+                  [&](auto& r) {
+                    r.set_effect_json(effect);
+                    r.set_onto_sequence_id(onto);
+                  })
+        .status();
+  };
+  const absl::Status none = refused(R"({"name": "melt", "morph": {}})", "");
+  EXPECT_EQ(none.code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(std::string(none.message()), testing::AllOf(HasSubstr("melt"), HasSubstr("onto_sequence_id")));
+  EXPECT_EQ(refused(R"({"name": "fall"})", second->id()).code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(refused("", second->id()).code(), absl::StatusCode::kInvalidArgument);
+  const absl::Status unknown = refused(R"({"name": "melt", "morph": {}})", "s77");
+  EXPECT_EQ(unknown.code(), absl::StatusCode::kNotFound);
+  EXPECT_THAT(std::string(unknown.message()), HasSubstr("onto_sequence_id"));
 }
 
 TEST_F(SchedulerServerTest, RefusesWhatIsWrong) {

@@ -56,6 +56,22 @@ TEST(JobFlags, AnEffectThatIsNoneIsRefusedBeforeAnythingIsSent) {
   EXPECT_THAT(std::string(request.status().message()), HasSubstr("pendulum"));
 }
 
+TEST(OntoFlags, AMorphAndASecondTakeNeedEachOther) {
+  JobFlags job;
+  job.effect = "morph";
+  const auto morph = job.Parse();
+  ASSERT_TRUE(morph.ok()) << morph.status();
+  EXPECT_THAT(std::string(OntoFlags{}.Open(*morph).status().message()), HasSubstr("--onto"));
+  job.effect = "pendulum";
+  const auto pendulum = job.Parse();
+  EXPECT_THAT(std::string(OntoFlags{.folder = "take2", .capture = {}}.Open(*pendulum).status().message()), HasSubstr("--effect morph"));
+  job.effect.clear();
+  EXPECT_THAT(std::string(OntoFlags{.folder = "take2", .capture = {}}.Open(*job.Parse()).status().message()), HasSubstr("--effect morph"));
+  const auto alone = OntoFlags{}.Open(*pendulum);
+  ASSERT_TRUE(alone.ok()) << alone.status();
+  EXPECT_FALSE(alone->has_value());
+}
+
 TEST(JobFlags, AFilmIsAskedForWithItsSize) {
   JobFlags flags;
   ASSERT_TRUE(flags.Parse().ok());
