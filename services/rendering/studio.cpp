@@ -25,6 +25,7 @@ constexpr float kFar = 1e4F;
 constexpr int kFirstRays = 32;  // from a patch of the ground, of each kind
 
 float Wrap(float x) { return x - std::floor(x); }
+float Fraction(double x) { return static_cast<float>(x - std::floor(x)); }
 
 float GradientNoise(std::int32_t column, std::int32_t row) {
   return Wrap(52.9829189F * Wrap(0.06711056F * static_cast<float>(column) + 0.00583715F * static_cast<float>(row)));
@@ -152,11 +153,11 @@ void StudioLight::SendOn(const Lit& lit, const Jitter& jitter, Open& open, std::
     sent[count++] = {.origin = origin, .direction = KeyDirection(disc), .reach = kFar, .time = lit.ray.time};
   }
   const Frame frame(open.normal);
-  const auto skies = static_cast<float>(rays_.sky);
   for (int i = 0; i < rays_.sky; ++i) {
-    // Over the pixel's samples the rays fill a square grid, each sample one cell of every row and column.
-    const float u = Wrap((static_cast<float>(i) + jitter.u) / skies);
-    const float v = Wrap((static_cast<float>((i + lit.sample) % rays_.sky) + jitter.v) / skies + static_cast<float>(i) / (skies * skies));
+    // All of a pixel's rays to the sky are one sequence that fills the square evenly, another one than that of its places on the lens (R4, Roberts).
+    const double k = lit.sample * rays_.sky + i;
+    const float u = Fraction(jitter.u + 0.8566748838545029 * k);
+    const float v = Fraction(jitter.v + 0.7338918566271260 * k);
     const auto disc = Disc2(u, v);
     const Vec3f direction = disc[0] * frame.x + disc[1] * frame.y + std::sqrt(std::max(1 - u, 0.0F)) * open.normal;
     sent[count++] = {.origin = origin, .direction = direction, .reach = kSkyReach * studio_.extent, .time = lit.ray.time};
