@@ -38,7 +38,7 @@ absl::StatusOr<std::string> ExplainByAttempts(const Catalogue& catalogue, const 
   switch (last.outcome) {
     case core::AttemptEnded::Outcome::kDone:
       if (failed == 0) return fmt::format("{} is done; it ended {}.", task, where);
-      return fmt::format("{} is done; it ended {}, and {} attempts before it failed.", task, where, failed);
+      return fmt::format("{} is done; it ended {}, after {} failed {}.", task, where, failed, failed == 1 ? "attempt" : "attempts");
     case core::AttemptEnded::Outcome::kFailed:
       return fmt::format("{} did not end: {} of {} attempts failed, the last {}: {}: {}.", task, failed, attempts.size(), where,
                          core::Name(last.cause), last.message);
@@ -99,7 +99,8 @@ absl::StatusOr<std::string> ExplainEnded(const Catalogue& catalogue, const std::
   const std::string state = message.state() == v1::DONE ? "done" : message.state() == v1::FAILED ? "failed" : "cancelled";
   for (const v1::FailedTask& failure : message.failures()) {
     const bool meant = task.empty() ? message.state() == v1::FAILED : task == failure.label() || task == failure.task_id();
-    if (meant) return fmt::format("{} failed: {}: {}.", job, failure.label(), failure.cause());
+    if (meant && task.empty()) return fmt::format("{} failed: {}: {}.", job, failure.label(), failure.cause());
+    if (meant) return fmt::format("{} failed: {}.", failure.label(), failure.cause());
   }
   if (task.empty()) return fmt::format("{} is {}.", job, state);
   return ExplainByAttempts(catalogue, job, task, state);

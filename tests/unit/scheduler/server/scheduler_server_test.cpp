@@ -574,7 +574,7 @@ TEST_F(SchedulerServerTest, EachAttemptIsKeptWithItsLog) {
   server_.reset();
   StartScheduler();
   check();
-  EXPECT_THAT(Explain(job->id(), "template"), HasSubstr("1 attempts before it failed"));
+  EXPECT_THAT(Explain(job->id(), "template"), HasSubstr("after 1 failed attempt."));
   EXPECT_THAT(Explain(job->id(), "guide"), HasSubstr("done"));
   EXPECT_THAT(Explain(job->id(), "no such task"), HasSubstr("no attempt"));
   EXPECT_EQ(Attempts("j99").status().code(), absl::StatusCode::kNotFound);
@@ -659,7 +659,7 @@ TEST_F(SchedulerServerTest, OnlyWhatNoUnfinishedJobReadsIsCollectedAndAskedForAg
   const auto sequence = Open();
   ASSERT_TRUE(AddFrames(sequence->id(), 0, 6).ok() && Close(sequence->id()).ok());
   const auto first = Submit(sequence->id());
-  StartWorker({.holds = [](const std::string& label) { return label.starts_with("simulate"); }});
+  StartWorker({.holds = [](const std::string& label) { return label == "calm: simulate"; }});
   ASSERT_EQ(WatchToEnd(first->id())->state(), v1::DONE);
   // A second job shares all of the first one's results but the sheets, and is held at its last stage.
   const auto second = Submit(sequence->id(), [](v1::SubmitJobRequest& request) {
