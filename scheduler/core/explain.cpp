@@ -18,7 +18,8 @@ std::string ExplainRun(const State& state, const Job& job, const Task& task, con
   const std::string attempts = run.tries.failed > 0 ? fmt::format(" ({} of {} attempts failed so far)", run.tries.failed, kFailedMax) : "";
   if (std::holds_alternative<LookingUp>(run.state))
     return fmt::format("{} is about to start: the store is being asked whether its result exists.", task.name);
-  if (std::holds_alternative<Resting>(run.state)) return fmt::format("{} waits a moment before its next attempt{}.", task.name, attempts);
+  if (const auto* resting = std::get_if<Resting>(&run.state))
+    return fmt::format("{} waits a moment before its next attempt{}; the last one ended with {}", task.name, attempts, resting->why);
   if (const auto* leased = std::get_if<Leased>(&run.state)) {
     const Worker& worker = state.workers[leased->worker];
     const std::string away = worker.connection == 0 ? ", which is away and may come back" : "";

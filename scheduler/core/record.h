@@ -95,7 +95,7 @@ struct AttemptEnded {
   std::string log;               // the end of what it printed
 };
 
-using Record = std::variant<ResultMade, TaskFailed, RunSaved, RunEnded, AttemptsReserved, JobCancelled, JobRetried, JobPaused, JobLimited,
-                            AttemptEnded>;
+using Record =
+    std::variant<ResultMade, TaskFailed, RunSaved, RunEnded, AttemptsReserved, JobCancelled, JobRetried, JobPaused, JobLimited, AttemptEnded>;
 
 }  // namespace vorocast::core

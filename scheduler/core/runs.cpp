@@ -129,7 +129,8 @@ void Transition::EndAttempt(RunIndex index, Cause cause, const std::string& mess
   const Verdict verdict = Judge(cause, run.tries);
   if (run.tasks.empty()) return Abandon(index);
   if (verdict.again) {
-    SetRun(index, verdict.rest > absl::ZeroDuration() ? RunState(Resting{now_ + verdict.rest}) : RunState(Ready{}));
+    SetRun(index, verdict.rest > absl::ZeroDuration() ? RunState(Resting{now_ + verdict.rest, fmt::format("{}: {}", Name(cause), message)})
+                                                      : RunState(Ready{}));
     return Save(run);
   }
   for (const TaskIndex task : run.tasks) {

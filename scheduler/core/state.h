@@ -76,6 +76,7 @@ struct LookingUp {};  // asked whether the result exists
 struct Ready {};
 struct Resting {
   absl::Time until;
+  std::string why;  // how the last attempt ended
 };
 struct Leased {
   std::int64_t attempt = 0;

@@ -19,6 +19,7 @@
 #include "services/client/percent_view.h"
 #include "services/client/run_job.h"
 #include "services/client/send_take.h"
+#include "services/client/through_breaks.h"
 
 namespace vorocast::client {
 namespace {
@@ -26,8 +27,11 @@ namespace {
 /// Shows the job until it has ended; an error unless it is done then.
 absl::Status FollowToItsEnd(SchedulerClient& client, const std::string& job_id) {
   JobView view;
-  ASSIGN_OR_RETURN(const v1::Job job, client.Watch(
-                                          job_id, [&](const v1::Job& now) { view.Show(now); }, Interrupted));
+  const auto watch = [&] {
+    return client.Watch(
+        job_id, [&](const v1::Job& now) { view.Show(now); }, Interrupted);
+  };
+  ASSIGN_OR_RETURN(const v1::Job job, ThroughBreaks(watch, [&](const std::string& line) { view.Say(line); }));
   view.Finish(job);
   if (job.state() == v1::DONE) return absl::OkStatus();
   return absl::AbortedError(fmt::format("job {} is not done; 'vorocast explain {}' says why", job_id, job_id));

@@ -16,40 +16,10 @@
 #include "services/client/job_view.h"
 #include "services/client/percent_view.h"
 #include "services/client/run_job.h"
+#include "services/client/through_breaks.h"
 
 namespace vorocast::client {
 namespace {
-
-constexpr auto kBreakPause = std::chrono::seconds(2);
-
-absl::Status Stopped() { return absl::CancelledError("stopped; the same command goes on from here"); }
-
-/// A break of the network, a scheduler that is started again, a disk that is being emptied: all of them pass. DATA_LOSS is a file that changed
-/// while it was read.
-bool MayPass(const absl::Status& status) {
-  return absl::IsUnavailable(status) || absl::IsDeadlineExceeded(status) || absl::IsResourceExhausted(status) || absl::IsDataLoss(status);
-}
-
-/// Calls until it works, is interrupted, or fails for a reason that will not pass. Says why it waits, once.
-template <typename Call>
-auto ThroughBreaks(const Call& call) -> decltype(call()) {
-  bool said = false;
-  while (true) {
-    auto result = call();
-    if (Interrupted()) return Stopped();
-    if (result.ok() || !MayPass(result.status())) {
-      if (said && result.ok()) fmt::print("It goes on.\n");
-      return result;
-    }
-    if (!std::exchange(said, true)) {
-      fmt::print("Waiting, and trying again until it works: {}\n", std::string(result.status().message()));
-      std::fflush(stdout);
-    }
-    for (auto slept = std::chrono::milliseconds(0); slept < kBreakPause && !Interrupted(); slept += std::chrono::milliseconds(100)) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(100));
-    }
-  }
-}
 
 /// "412 frames sent, 3 being written": one line, redrawn on a terminal, every five seconds elsewhere.
 class FollowView {
@@ -94,7 +64,7 @@ class Follower {
     view_.Say(fmt::format("Following {}; it is over when {}{} appears in it", folder_.string(),
                           follow_.idle.count() > 0 ? fmt::format("nothing was written for {} s, or ", follow_.idle.count()) : "", kTakeIsOver));
     while (true) {
-      if (Interrupted()) return Stopped();
+      if (Interrupted()) return StoppedByUser();
       // Asked first, so that what was written before it is seen below.
       const bool said_over = std::filesystem::exists(folder_ / kTakeIsOver);
       ASSIGN_OR_RETURN(const capture::Capture capture, Look(folder_, options_));
@@ -115,15 +85,20 @@ class Follower {
   }
 
  private:
+  template <typename Call>
+  auto Through(const Call& call) {
+    return ThroughBreaks(call, [this](const std::string& line) { view_.Say(line); });
+  }
+
   absl::Status Send(const capture::Capture& capture, const std::vector<capture::CaptureFrame>& frames) {
     if (!job_) {
       if (const absl::Status status = CheckCapture(capture); !status.ok()) view_.Say(fmt::format("Warning: {}", std::string(status.message())));
-      ASSIGN_OR_RETURN(const v1::Sequence sequence, ThroughBreaks([&] { return client_.OpenSequence(capture, session_); }));
+      ASSIGN_OR_RETURN(const v1::Sequence sequence, Through([&] { return client_.OpenSequence(capture, session_); }));
       request_.set_sequence_id(sequence.id());
-      ASSIGN_OR_RETURN(job_, ThroughBreaks([&] { return client_.Submit(request_); }));
+      ASSIGN_OR_RETURN(job_, Through([&] { return client_.Submit(request_); }));
       view_.Say(fmt::format("Job {}", job_->id()));
     }
-    return ThroughBreaks([&] { return client_.SendFrames(request_.sequence_id(), frames, {}, Interrupted); }).status();
+    return Through([&] { return client_.SendFrames(request_.sequence_id(), frames, {}, Interrupted); }).status();
   }
 
   absl::StatusOr<v1::Job> Close(bool said_over) {
@@ -132,8 +107,8 @@ class Follower {
                                              said_over ? "" : fmt::format(" for {} s; --idle waits longer", follow_.idle.count())));
     }
     view_.Say(fmt::format("{}: the take is over with {} frames", said_over ? kTakeIsOver : "Nothing was written any more", growing_.left_count()));
-    RETURN_IF_ERROR(ThroughBreaks([&] { return client_.CloseSequence(request_.sequence_id()); }).status());
-    return ThroughBreaks([&] { return client_.Get(job_->id()); });
+    RETURN_IF_ERROR(Through([&] { return client_.CloseSequence(request_.sequence_id()); }).status());
+    return Through([&] { return client_.Get(job_->id()); });
   }
 
   SchedulerClient& client_;
@@ -155,14 +130,19 @@ absl::StatusOr<v1::Job> SendTake(SchedulerClient& client, const std::filesystem:
 
   ASSIGN_OR_RETURN(const capture::Capture capture, capture::OpenCapture(folder, options));
   RETURN_IF_ERROR(CheckCapture(capture));
+  const auto say = [](const std::string& line) {
+    fmt::print("{}\n", line);
+    std::fflush(stdout);
+  };
   PercentView view("Frames");
-  ASSIGN_OR_RETURN(const v1::Sequence sequence, ThroughBreaks([&] {
-                     return client.Upload(
-                         capture, session, [&](double fraction) { view.Show(fraction); }, Interrupted);
-                   }));
+  const auto upload = [&] {
+    return client.Upload(
+        capture, session, [&](double fraction) { view.Show(fraction); }, Interrupted);
+  };
+  ASSIGN_OR_RETURN(const v1::Sequence sequence, ThroughBreaks(upload, say));
   view.Finish();
   request.set_sequence_id(sequence.id());
-  ASSIGN_OR_RETURN(const v1::Job job, ThroughBreaks([&] { return client.Submit(request); }));
+  ASSIGN_OR_RETURN(const v1::Job job, ThroughBreaks([&] { return client.Submit(request); }, say));
   fmt::print("Job {}\n", job.id());
   return job;
 }
