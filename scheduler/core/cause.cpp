@@ -31,7 +31,19 @@ std::string_view Name(Cause cause) {
   VOROCAST_CHECK(false && "unknown cause");
 }
 
-Verdict Judge(Cause cause, Tries& tries) {
+bool CouldBeTheWorkers(Cause cause) { return cause == Cause::kCrashed || cause == Cause::kStore || cause == Cause::kInternal; }
+
+namespace {
+
+/// Reaching a limit is worth one attempt under twice that limit.
+bool Raise(std::int32_t given, std::int32_t max, std::int32_t& raised, std::int32_t failed) {
+  if (given < raised) return failed < kFailedMax;  // raised already since this attempt began
+  return raised < max && ++raised > 0;
+}
+
+}  // namespace
+
+Verdict Judge(Cause cause, const Raised& given, Tries& tries) {
   switch (cause) {
     case Cause::kInput:
     case Cause::kNeeds:
@@ -39,9 +51,11 @@ Verdict Judge(Cause cause, Tries& tries) {
       return {.again = false};
     case Cause::kOutOfMemory:
       ++tries.failed;
-      return {.again = tries.memory_raised++ < kMemoryRaisedMax};
-    case Cause::kCrashed:
+      return {.again = Raise(given.memory, kMemoryRaisedMax, tries.memory_raised, tries.failed)};
     case Cause::kTimedOut:
+      ++tries.failed;
+      return {.again = Raise(given.time, kTimeRaisedMax, tries.time_raised, tries.failed)};
+    case Cause::kCrashed:
     case Cause::kInternal:
       return {.again = ++tries.failed < kFailedMax};
     case Cause::kStore:

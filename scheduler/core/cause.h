@@ -38,8 +38,16 @@ struct Verdict {
 inline constexpr std::int32_t kFailedMax = 3;
 inline constexpr std::int32_t kInterruptedMax = 10;
 inline constexpr std::int32_t kMemoryRaisedMax = 1;
+inline constexpr std::int32_t kTimeRaisedMax = 1;
 
+/// The limits that the ended attempt was given: with two at once they may be lower than what the next one gets.
+struct Raised {
+  std::int32_t memory = 0;
+  std::int32_t time = 0;
+};
 /// The one place that sorts causes: enters the ended attempt in `tries` and says whether another makes sense.
-Verdict Judge(Cause cause, Tries& tries);
+Verdict Judge(Cause cause, const Raised& given, Tries& tries);
+/// Whether the worker could be the reason: another might do better.
+bool CouldBeTheWorkers(Cause cause);
 
 }  // namespace vorocast::core

@@ -42,11 +42,38 @@ absl::Status CheckTask(const State& state, TaskIndex index, bool keys) {
   return absl::OkStatus();
 }
 
-absl::Status CheckRuns(const State& state) {
-  std::size_t ready = 0;
-  std::size_t timed = 0;
+/// What the accounts should say.
+struct Recount {
   std::map<std::string, std::int32_t> leased_by_user;
-  std::set<std::int64_t> attempts;
+  std::map<JobIndex, std::int32_t> at_work;
+  std::size_t leases = 0;
+};
+
+absl::Status CheckLeased(const State& state, RunIndex index, const Leased& leased, std::set<std::int64_t>& numbers, Recount& recount) {
+  const Run& run = state.runs[index];
+  REQUIRE_THAT(run.saved, "run {}", index);
+  REQUIRE_THAT(leased.attempts.size() == 1 || leased.attempts.size() == 2, "run {} has {} attempts", index, leased.attempts.size());
+  REQUIRE_THAT(leased.attempts.front().worker != leased.attempts.back().worker || leased.attempts.size() == 1, "run {} twice on a worker", index);
+  for (const Attempt& attempt : leased.attempts) {
+    ++recount.leases;
+    REQUIRE_THAT(numbers.insert(attempt.number).second, "attempt {} twice", attempt.number);
+    REQUIRE_THAT(attempt.number < state.attempt_next && state.attempt_next <= state.attempt_reserved, "attempt {}", attempt.number);
+    REQUIRE_THAT(state.deadlines.contains({attempt.deadline, index, attempt.number}), "run {}", index);
+    REQUIRE_THAT(state.workers[attempt.worker].runs.contains(index), "run {}", index);
+    if (attempt.job == kNone) continue;
+    const auto is_its = [&](TaskIndex task) { return state.tasks[task].job == attempt.job; };
+    REQUIRE_THAT(std::any_of(run.tasks.begin(), run.tasks.end(), is_its), "run {} is on the account of a job that does not want it", index);
+    ++recount.leased_by_user[state.jobs[attempt.job].user];
+    ++recount.at_work[attempt.job];
+  }
+  return absl::OkStatus();
+}
+
+absl::Status CheckRuns(const State& state) {
+  std::set<std::tuple<JobIndex, TaskIndex, RunIndex>> ready;
+  std::size_t timed = 0;
+  Recount recount;
+  std::set<std::int64_t> numbers;
   for (const auto& [key, index] : state.run_by_key) {
     const Run& run = state.runs[index];
     REQUIRE_THAT(run.key == key, "run {}", index);
@@ -54,55 +81,83 @@ absl::Status CheckRuns(const State& state) {
     for (const TaskIndex task : run.tasks) {
       const auto* wanted = std::get_if<Wanted>(&state.tasks[task].state);
       REQUIRE_THAT(wanted && wanted->run == index, "run {}", index);
+      if (std::holds_alternative<Ready>(run.state)) ready.insert({state.tasks[task].job, task, index});
     }
-    if (std::holds_alternative<Ready>(run.state)) ++ready;
     if (const auto* resting = std::get_if<Resting>(&run.state)) {
       ++timed;
-      REQUIRE_THAT(state.deadlines.contains({resting->until, index}), "run {}", index);
+      REQUIRE_THAT(state.deadlines.contains({resting->until, index, 0}), "run {}", index);
     }
     const auto* leased = std::get_if<Leased>(&run.state);
-    if (!leased) continue;
-    ++timed;
-    REQUIRE_THAT(run.saved, "run {}", index);
-    REQUIRE_THAT(attempts.insert(leased->attempt).second, "attempt {} twice", leased->attempt);
-    REQUIRE_THAT(leased->attempt < state.attempt_next && state.attempt_next <= state.attempt_reserved, "attempt {}", leased->attempt);
-    REQUIRE_THAT(state.deadlines.contains({leased->deadline, index}), "run {}", index);
-    REQUIRE_THAT(state.workers[leased->worker].runs.contains(index), "run {}", index);
-    if (!run.tasks.empty()) {
-      const TaskIndex first = *std::min_element(run.tasks.begin(), run.tasks.end(), [&](TaskIndex a, TaskIndex b) {
-        const auto rank = [&](TaskIndex t) { return std::tuple(-state.jobs[state.tasks[t].job].priority, state.tasks[t].job, t); };
-        return rank(a) < rank(b);
-      });
-      ++leased_by_user[state.jobs[state.tasks[first].job].user];
-    }
+    if (leased) RETURN_IF_ERROR(CheckLeased(state, index, *leased, numbers, recount));
   }
   REQUIRE_THAT(state.run_by_key.size() + state.free_runs.size() == state.runs.size(), "runs");
-  REQUIRE_THAT(timed == state.deadlines.size(), "deadlines");
-  REQUIRE_THAT(leased_by_user == state.leased_by_user, "leases by user");
+  REQUIRE_THAT(timed + recount.leases == state.deadlines.size(), "deadlines");
+  REQUIRE_THAT(recount.leased_by_user == state.leased_by_user, "leases by user");
   std::size_t queued = 0;
-  for (const auto& [key, group] : state.groups) {
-    for (const auto& places : group.ready) queued += places.size();
+  std::size_t listed = 0;
+  for (JobIndex index = 0; index < state.jobs.size(); ++index) {
+    const Job& job = state.jobs[index];
+    REQUIRE_THAT(job.at_work == recount.at_work[index], "{} has {} at work", job.id, job.at_work);
+    REQUIRE_THAT(job.terms.workers_max == 0 || job.at_work <= job.terms.workers_max, "{} has {} at work", job.id, job.at_work);
+    std::uint32_t kinds = 0;
+    for (std::size_t kind = 0; kind < kKinds; ++kind) {
+      queued += job.ready[kind].size();
+      for (const auto& [task, run] : job.ready[kind]) {
+        REQUIRE_THAT(ready.contains({index, task, run}) && static_cast<std::size_t>(state.tasks[task].kind) == kind, "{} run {}", job.id, run);
+      }
+      const bool may_go = !job.ready[kind].empty() && !job.paused && !job.starts_nothing() && job.has_room();
+      if (!may_go) continue;
+      ++listed;
+      kinds |= 1u << kind;
+      REQUIRE_THAT(state.groups.at({job.priority, job.user}).jobs[kind].contains(PlaceOf(job, index)), "{} kind {}", job.id, kind);
+    }
+    REQUIRE_THAT(kinds == job.listed, "{}", job.id);
   }
-  REQUIRE_THAT(queued == ready, "{} queued, {} ready", queued, ready);
+  REQUIRE_THAT(queued == ready.size(), "{} queued, {} ready", queued, ready.size());
+  for (const auto& [key, group] : state.groups) {
+    std::size_t places = 0;
+    for (const auto& jobs : group.jobs) places += jobs.size();
+    REQUIRE_THAT(places > 0, "an empty group of {}", key.user);
+    listed -= places;
+  }
+  REQUIRE_THAT(listed == 0, "jobs in groups");
+  return absl::OkStatus();
+}
+
+absl::Status CheckSetAside(const State& state) {
+  std::uint32_t kinds = 0;
+  std::size_t set_aside = 0;
+  for (const Worker& worker : state.workers) {
+    if (worker.is_there() && !worker.health.set_aside) kinds |= worker.kinds;
+  }
+  for (WorkerIndex index = 0; index < state.workers.size(); ++index) {
+    const Worker& worker = state.workers[index];
+    if (!worker.health.set_aside) continue;
+    ++set_aside;
+    REQUIRE_THAT(state.set_aside.contains({worker.health.until, index}), "worker {}", worker.name);
+    REQUIRE_THAT(worker.connection == 0 || (worker.kinds & ~kinds) == 0, "worker {} is set aside and nobody is left for its work", worker.name);
+  }
+  REQUIRE_THAT(set_aside == state.set_aside.size(), "set aside");
   return absl::OkStatus();
 }
 
 absl::Status CheckWorkers(const State& state) {
   std::size_t idle = 0;
-  std::size_t leases = 0;
+  std::size_t held = 0;
   for (WorkerIndex index = 0; index < state.workers.size(); ++index) {
     const Worker& worker = state.workers[index];
-    leases += worker.runs.size();
+    held += worker.runs.size();
     for (const RunIndex run : worker.runs) {
       const auto* leased = std::get_if<Leased>(&state.runs[run].state);
-      REQUIRE_THAT(leased && leased->worker == index, "worker {}", worker.name);
+      const auto is_its = [index](const Attempt& attempt) { return attempt.worker == index; };
+      REQUIRE_THAT(leased && std::count_if(leased->attempts.begin(), leased->attempts.end(), is_its) == 1, "worker {}", worker.name);
     }
     if (worker.free() > 0) {
       ++idle;
       REQUIRE_THAT(state.idle.at(worker.kinds).contains({-worker.free(), index}), "worker {}", worker.name);
       for (const auto& [key, group] : state.groups) {
         for (std::size_t kind = 0; kind < kKinds; ++kind) {
-          REQUIRE_THAT(!(worker.kinds & (1u << kind)) || group.ready[kind].empty(), "worker {} is idle while work waits", worker.name);
+          REQUIRE_THAT(!(worker.kinds & (1u << kind)) || group.jobs[kind].empty(), "worker {} is idle while work waits", worker.name);
         }
       }
     }
@@ -112,9 +167,11 @@ absl::Status CheckWorkers(const State& state) {
   std::size_t listed = 0;
   for (const auto& [kinds, workers] : state.idle) listed += workers.size();
   REQUIRE_THAT(listed == idle, "idle workers");
-  std::size_t leased = 0;
-  for (const auto& [key, run] : state.run_by_key) leased += std::holds_alternative<Leased>(state.runs[run].state);
-  REQUIRE_THAT(leased == leases, "leases");
+  std::size_t leases = 0;
+  for (const auto& [key, run] : state.run_by_key) {
+    if (const auto* leased = std::get_if<Leased>(&state.runs[run].state)) leases += leased->attempts.size();
+  }
+  REQUIRE_THAT(held == leases, "leases");
   return absl::OkStatus();
 }
 
@@ -166,6 +223,7 @@ absl::Status Check(const State& state, bool keys) {
   }
   RETURN_IF_ERROR(CheckRuns(state));
   RETURN_IF_ERROR(CheckWorkers(state));
+  RETURN_IF_ERROR(CheckSetAside(state));
   for (const Job& job : state.jobs) RETURN_IF_ERROR(CheckJob(state, job));
   return absl::OkStatus();
 }

@@ -99,6 +99,13 @@ struct CancelJob {
 /// Tries failed and cancelled tasks again. A job that is over also looks for each of its results again, and reads it: files get lost and damaged.
 struct RetryJob {
   std::string job;
+  std::int64_t memory_limit = 0;  // of its attempts from now on, as in JobTerms; 0: as it was
+  double time_factor = 0;         // likewise
+};
+/// Nothing further of it is started, or it goes on. Not for a job that is over.
+struct PauseJob {
+  std::string job;
+  bool paused = true;
 };
 /// Frees what a job that is over takes in memory. For others nothing happens.
 struct JobForgotten {
@@ -106,6 +113,6 @@ struct JobForgotten {
 };
 
 using Event = std::variant<Restored, JobSubmitted, TasksAdded, LookUpAnswered, WorkerConnected, WorkerDisconnected, WorkerLeaving, Heartbeat,
-                           Finished, Tick, CancelJob, RetryJob, JobForgotten>;
+                           Finished, Tick, CancelJob, RetryJob, PauseJob, JobForgotten>;
 
 }  // namespace vorocast::core

@@ -21,9 +21,19 @@ std::string ExplainRun(const State& state, const Job& job, const Task& task, con
   if (const auto* resting = std::get_if<Resting>(&run.state))
     return fmt::format("{} waits a moment before its next attempt{}; the last one ended with {}", task.name, attempts, resting->why);
   if (const auto* leased = std::get_if<Leased>(&run.state)) {
-    const Worker& worker = state.workers[leased->worker];
+    const Attempt& first = leased->attempts.front();
+    const Worker& worker = state.workers[first.worker];
     const std::string away = worker.connection == 0 ? ", which is away and may come back" : "";
-    return fmt::format("{} runs on worker {}{}, {:.0f} % done{}.", task.name, worker.name, away, 100 * leased->fraction, attempts);
+    std::string copy;
+    if (leased->attempts.size() > 1) {
+      const Attempt& second = leased->attempts.back();
+      copy = fmt::format(", and as it takes long also on worker {}, {:.0f} %", state.workers[second.worker].name, 100 * second.fraction);
+    }
+    return fmt::format("{} runs on worker {}{}, {:.0f} % done{}{}.", task.name, worker.name, away, 100 * first.fraction, copy, attempts);
+  }
+  if (job.paused) return fmt::format("{} waits: {} is paused; 'vorocast resume {}' lets it go on.", task.name, job.id, job.id);
+  if (!job.has_room()) {
+    return fmt::format("{} waits its turn{}: {} may have {} workers at once, and has them.", task.name, attempts, job.id, job.terms.workers_max);
   }
   if (!AnyWorkerFor(state, task.kind, false))
     return fmt::format("{} waits for a worker that can {}: none is connected.", task.name, tasks::Name(task.kind));
@@ -73,6 +83,10 @@ std::string Explain(const State& state, const Job& job) {
   if (phase == Phase::kDone && job.bad_frames > 0) return fmt::format("{} is done; {} bad frames were made up for.", job.id, job.bad_frames);
   if (phase == Phase::kDone) return fmt::format("{} is done.", job.id);
   if (phase == Phase::kFailed) return fmt::format("{} failed: {}", job.id, ExplainTask(state, job, FailureThatCounts(state, job)));
+  if (job.paused) {
+    return fmt::format("{} is paused: {} of its tasks still run to their end, and nothing further is started; 'vorocast resume {}' lets it go on.",
+                       job.id, job.running.size(), job.id);
+  }
   if (!job.running.empty()) {
     return fmt::format("{} runs: {} tasks at work, the first of them {}", job.id, job.running.size(),
                        ExplainTask(state, job, state.tasks[*job.running.begin()]));

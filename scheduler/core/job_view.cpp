@@ -103,7 +103,11 @@ JobView View(const State& state, const Job& job) {
   std::array<double, kKinds> running{};
   for (const TaskIndex index : job.running) {
     const Task& task = state.tasks[index];
-    running[static_cast<std::size_t>(task.kind)] += std::get<Leased>(state.runs[std::get<Wanted>(task.state).run].state).fraction;
+    double furthest = 0;
+    for (const Attempt& attempt : std::get<Leased>(state.runs[std::get<Wanted>(task.state).run].state).attempts) {
+      furthest = std::max(furthest, attempt.fraction);
+    }
+    running[static_cast<std::size_t>(task.kind)] += furthest;
   }
   for (const tasks::Kind kind : tasks::kAllKinds) {
     const KindCounts& counts = job.counts[static_cast<std::size_t>(kind)];

@@ -19,13 +19,19 @@ void Transition::On(Restored& event) {
       state_.tries_before.emplace(saved.key, saved.tries);
       continue;
     }
-    const auto found = state_.worker_by_name.find(saved.worker);
-    const WorkerIndex worker = found == state_.worker_by_name.end() ? AddWorker(saved.worker) : found->second;
+    const WorkerIndex worker = Known(saved.worker);
     const auto index = static_cast<RunIndex>(state_.runs.size());
     state_.runs.push_back({.key = saved.key, .tries = saved.tries, .saved = true});
     state_.run_by_key.emplace(saved.key, index);
-    SetRun(index, Leased{.attempt = saved.attempt, .worker = worker, .deadline = now_ + state_.settings.lease, .started = now_});
+    Leased leased;
+    leased.attempts.push_back(Remembered(saved.attempt, worker));
+    if (!saved.copy_worker.empty()) leased.attempts.push_back(Remembered(saved.copy_attempt, Known(saved.copy_worker)));
+    SetRun(index, std::move(leased));
   }
+}
+
+Attempt Transition::Remembered(std::int64_t number, WorkerIndex worker) const {
+  return {.number = number, .worker = worker, .deadline = now_ + state_.settings.lease, .started = now_};
 }
 
 void Transition::On(JobSubmitted& event) {
@@ -36,6 +42,8 @@ void Transition::On(JobSubmitted& event) {
   job.name = std::move(event.name);
   job.user = std::move(event.user);
   job.priority = event.priority;
+  job.terms = event.terms;
+  job.paused = event.paused;
   job.cancelled = event.cancelled;
   job.verify = event.verify;
   for (TaskFailed& failure : event.failures) {
@@ -86,7 +94,23 @@ void Transition::On(RetryJob& event) {
   job.stopped = job.impossible;
   job.failed_before.clear();
   effects_.records.push_back(JobRetried{job.id});
+  if (event.memory_limit > 0) job.terms.memory_limit = event.memory_limit;
+  if (event.time_factor > 0) job.terms.time_factor = event.time_factor;
+  if (event.memory_limit > 0 || event.time_factor > 0) {
+    effects_.records.push_back(JobLimited{job.id, job.terms.memory_limit, job.terms.time_factor});
+  }
   ResetTasks(found->second, over);
+  Changed(found->second);
+}
+
+void Transition::On(PauseJob& event) {
+  const auto found = state_.job_by_id.find(event.job);
+  if (found == state_.job_by_id.end()) return;
+  Job& job = state_.jobs[found->second];
+  if (job.paused == event.paused || IsOver(job)) return;
+  job.paused = event.paused;
+  effects_.records.push_back(JobPaused{job.id, job.paused});
+  Relist(found->second);
   Changed(found->second);
 }
 

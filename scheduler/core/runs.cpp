@@ -33,48 +33,6 @@ void Transition::SetRun(RunIndex index, RunState next) {
   for (const TaskIndex task : state_.runs[index].tasks) Count(task, +1);
 }
 
-void Transition::List(RunIndex index) {
-  const Run& run = state_.runs[index];
-  if (std::holds_alternative<Ready>(run.state) && !run.tasks.empty()) {
-    const TaskIndex first = First(run);
-    const Job& job = state_.jobs[state_.tasks[first].job];
-    state_.groups[{job.priority, job.user}].ready[static_cast<std::size_t>(run.kind)].insert({state_.tasks[first].job, first, index});
-  } else if (const auto* resting = std::get_if<Resting>(&run.state)) {
-    state_.deadlines.insert({resting->until, index});
-  } else if (const auto* leased = std::get_if<Leased>(&run.state)) {
-    state_.deadlines.insert({leased->deadline, index});
-    if (!run.tasks.empty()) ++state_.leased_by_user[state_.jobs[state_.tasks[First(run)].job].user];
-    Delist(leased->worker);
-    state_.workers[leased->worker].runs.insert(index);
-    Enlist(leased->worker);
-  }
-}
-
-void Transition::Unlist(RunIndex index) {
-  const Run& run = state_.runs[index];
-  if (std::holds_alternative<Ready>(run.state) && !run.tasks.empty()) {
-    const TaskIndex first = First(run);
-    const Job& job = state_.jobs[state_.tasks[first].job];
-    const auto group = state_.groups.find({job.priority, job.user});
-    VOROCAST_CHECK(group != state_.groups.end());
-    auto& ready = group->second.ready;
-    VOROCAST_CHECK(ready[static_cast<std::size_t>(run.kind)].erase({state_.tasks[first].job, first, index}) == 1);
-    if (std::all_of(ready.begin(), ready.end(), [](const auto& places) { return places.empty(); })) state_.groups.erase(group);
-  } else if (const auto* resting = std::get_if<Resting>(&run.state)) {
-    state_.deadlines.erase({resting->until, index});
-  } else if (const auto* leased = std::get_if<Leased>(&run.state)) {
-    state_.deadlines.erase({leased->deadline, index});
-    if (!run.tasks.empty()) {
-      const auto user = state_.leased_by_user.find(state_.jobs[state_.tasks[First(run)].job].user);
-      if (--user->second == 0) state_.leased_by_user.erase(user);
-    }
-    Delist(leased->worker);
-    state_.workers[leased->worker].runs.erase(index);
-    Enlist(leased->worker);
-    absent_.push_back(leased->worker);
-  }
-}
-
 void Transition::EndRun(RunIndex index, const std::function<TaskState(const Task&)>& outcome) {
   for (const TaskIndex task : state_.runs[index].tasks) Count(task, -1);
   Unlist(index);
@@ -90,60 +48,104 @@ void Transition::EndRun(RunIndex index, const std::function<TaskState(const Task
   }
 }
 
-void Transition::Abandon(RunIndex index) {
-  if (const auto* leased = std::get_if<Leased>(&state_.runs[index].state)) {
-    const Worker& worker = state_.workers[leased->worker];
-    if (worker.connection != 0) Send(worker.connection, Revoke{{{state_.runs[index].key, leased->attempt}}});
+void Transition::RevokeOthers(RunIndex index, std::int64_t ended) {
+  const auto* leased = std::get_if<Leased>(&state_.runs[index].state);
+  if (!leased) return;
+  for (const Attempt& attempt : leased->attempts) {
+    if (attempt.number == ended) continue;
+    RecordAttempt(attempt, state_.runs[index], {.outcome = AttemptEnded::Outcome::kCancelled});
+    const Worker& worker = state_.workers[attempt.worker];
+    if (worker.connection != 0) Send(worker.connection, Revoke{{{state_.runs[index].key, attempt.number}}});
   }
+}
+
+void Transition::Abandon(RunIndex index) {
+  RevokeOthers(index, 0);
   EndRun(index, [](const Task& task) { return task.state; });
 }
 
 void Transition::Save(const Run& run) {
   RunSaved saved{.key = run.key, .tries = run.tries};
   if (const auto* leased = std::get_if<Leased>(&run.state)) {
-    saved.attempt = leased->attempt;
-    saved.worker = state_.workers[leased->worker].name;
+    const Attempt& first = leased->attempts.front();
+    const Attempt& last = leased->attempts.back();
+    saved.attempt = first.number;
+    saved.worker = state_.workers[first.worker].name;
+    if (&first != &last) {
+      saved.copy_attempt = last.number;
+      saved.copy_worker = state_.workers[last.worker].name;
+    }
   }
   effects_.records.push_back(std::move(saved));
 }
 
-void Transition::RecordAttempt(const Run& run, const Task& task, AttemptEnded ended) {
-  const auto& leased = std::get<Leased>(run.state);
+void Transition::RecordAttempt(const Attempt& attempt, const Task& task, AttemptEnded ended) {
   ended.job = state_.jobs[task.job].id;
   ended.task = task.name;
   ended.kind = task.kind;
-  ended.attempt = leased.attempt;
-  ended.worker = state_.workers[leased.worker].name;
+  ended.attempt = attempt.number;
+  ended.worker = state_.workers[attempt.worker].name;
   // One that began under an earlier scheduler is older than this one knows.
-  ended.lasted = std::max(ended.lasted, now_ - leased.started);
+  ended.lasted = std::max(ended.lasted, now_ - attempt.started);
   effects_.records.emplace_back(std::move(ended));
 }
 
-void Transition::EndAttempt(RunIndex index, Cause cause, const std::string& message, const AttemptEnded& told) {
+void Transition::RecordAttempt(const Attempt& attempt, const Run& run, const AttemptEnded& ended) {
+  for (const TaskIndex task : run.tasks) RecordAttempt(attempt, state_.tasks[task], ended);
+}
+
+void Transition::DropAttempt(RunIndex index, std::int64_t number) {
   Run& run = state_.runs[index];
+  Unlist(index);
+  std::erase_if(std::get<Leased>(run.state).attempts, [number](const Attempt& attempt) { return attempt.number == number; });
+  List(index);
+  Save(run);
+  for (const TaskIndex task : run.tasks) Changed(state_.tasks[task].job);
+}
+
+void Transition::EndAttempt(const Held& held, Cause cause, const std::string& message, const AttemptEnded& told) {
+  const RunIndex index = held.run;
+  Run& run = state_.runs[index];
+  const Attempt attempt = *held.attempt;
   AttemptEnded ended = told;
   ended.outcome = AttemptEnded::Outcome::kFailed;
   ended.cause = cause;
   ended.message = message;
-  for (const TaskIndex task : run.tasks) RecordAttempt(run, state_.tasks[task], ended);
-  const Verdict verdict = Judge(cause, run.tries);
+  RecordAttempt(attempt, run, ended);
+  if (CouldBeTheWorkers(cause)) NoteFailure(run, attempt.worker);
+  const Verdict verdict = Judge(cause, {.memory = attempt.memory_raised, .time = attempt.time_raised}, run.tries);
+  const bool goes_on = std::get<Leased>(run.state).attempts.size() > 1;
+  // The other attempt may still make it, unless the input is at fault.
+  if (goes_on && (verdict.again || cause != Cause::kInput)) return DropAttempt(index, attempt.number);
   if (run.tasks.empty()) return Abandon(index);
   if (verdict.again) {
     SetRun(index, verdict.rest > absl::ZeroDuration() ? RunState(Resting{now_ + verdict.rest, fmt::format("{}: {}", Name(cause), message)})
                                                       : RunState(Ready{}));
     return Save(run);
   }
+  RevokeOthers(index, attempt.number);
   for (const TaskIndex task : run.tasks) {
     effects_.records.push_back(TaskFailed{state_.jobs[state_.tasks[task].job].id, state_.tasks[task].name, cause, message});
   }
   EndRun(index, [&](const Task&) { return Failed{cause, message}; });
 }
 
-RunIndex Transition::FindAttempt(const AttemptId& id) const {
+Transition::Held Transition::FindAttempt(const AttemptId& id) {
   const auto found = state_.run_by_key.find(id.key);
-  if (found == state_.run_by_key.end()) return kNone;
-  const auto* leased = std::get_if<Leased>(&state_.runs[found->second].state);
-  return leased && leased->attempt == id.attempt ? found->second : kNone;
+  if (found == state_.run_by_key.end()) return {};
+  auto* leased = std::get_if<Leased>(&state_.runs[found->second].state);
+  if (!leased) return {};
+  for (Attempt& attempt : leased->attempts) {
+    if (attempt.number == id.attempt) return {found->second, &attempt};
+  }
+  return {};
+}
+
+Transition::Held Transition::AttemptOf(RunIndex run, WorkerIndex worker) {
+  for (Attempt& attempt : std::get<Leased>(state_.runs[run].state).attempts) {
+    if (attempt.worker == worker) return {run, &attempt};
+  }
+  VOROCAST_CHECK(false && "a worker holds a run that does not know it");
 }
 
 void Transition::On(LookUpAnswered& event) {
@@ -168,22 +170,29 @@ void Transition::On(Finished& event) {
   // Whatever it is, the worker need not tell it again.
   Send(event.connection, Acknowledge{{event.id}});
   if (const WorkerIndex worker = WorkerOf(event.connection); worker != kNone) Hear(worker);
-  const RunIndex index = FindAttempt(event.id);
-  if (index == kNone) return;
+  const Held held = FindAttempt(event.id);
+  if (held.run == kNone) return;
   AttemptEnded ended{.log = std::move(event.log)};
   if (const auto* failed = std::get_if<AttemptFailed>(&event.outcome)) {
     ended.lasted = absl::Seconds(failed->seconds);
     ended.cpu_seconds = failed->cpu_seconds;
     ended.memory_peak = failed->memory_peak;
-    return EndAttempt(index, failed->cause, failed->message, ended);
+    return EndAttempt(held, failed->cause, failed->message, ended);
   }
+  const RunIndex index = held.run;
   Result& result = std::get<Succeeded>(event.outcome).result;
   const Run& run = state_.runs[index];
   ended.lasted = absl::Seconds(result.seconds);
   ended.cpu_seconds = result.cpu_seconds;
   ended.memory_peak = result.memory_peak;
-  for (const TaskIndex task : run.tasks) RecordAttempt(run, state_.tasks[task], ended);
-  if (!run.tasks.empty()) result.made_for = state_.jobs[state_.tasks[First(run)].job].id;
+  RecordAttempt(*held.attempt, run, ended);
+  NoteSuccess(run, held.attempt->worker);
+  if (!run.tasks.empty()) {
+    Job& job = state_.jobs[state_.tasks[First(run)].job];
+    result.made_for = job.id;
+    job.recent[static_cast<std::size_t>(run.kind)].Add(result.seconds);
+  }
+  RevokeOthers(index, event.id.attempt);
   effects_.records.push_back(ResultMade{event.id.key, result});
   EndRun(index, [&](const Task& task) { return Done{event.id.key, result, result.made_for != state_.jobs[task.job].id}; });
 }

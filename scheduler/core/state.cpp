@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "scheduler/core/state.h"
 
+#include <algorithm>
+#include <limits>
+
 #include "services/base/check.h"
 
 namespace vorocast::core {
@@ -40,6 +43,26 @@ tasks::TaskSpec SpecOf(const State& state, const Task& task) {
     if (const auto* done = std::get_if<Done>(&maker.state)) named.digest = done->key;
   }
   return spec;
+}
+
+void RecentTimes::Add(double value) {
+  if (!(value > 0)) return;
+  if (seconds.size() < kKept) return seconds.push_back(static_cast<float>(value));
+  seconds[next] = static_cast<float>(value);
+  next = (next + 1) % kKept;
+}
+
+double RecentTimes::Median() const {
+  constexpr std::size_t kEnough = 5;
+  if (seconds.size() < kEnough) return 0;
+  std::vector<float> sorted = seconds;
+  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+  std::nth_element(sorted.begin(), middle, sorted.end());
+  return *middle;
+}
+
+JobPlace PlaceOf(const Job& job, JobIndex index) {
+  return {job.terms.deadline > 0 ? job.terms.deadline : std::numeric_limits<double>::infinity(), index};
 }
 
 bool IsOver(const Job& job) {

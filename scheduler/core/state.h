@@ -78,12 +78,20 @@ struct Resting {
   absl::Time until;
   std::string why;  // how the last attempt ended
 };
-struct Leased {
-  std::int64_t attempt = 0;
+/// A worker at work on a run.
+struct Attempt {
+  std::int64_t number = 0;
   WorkerIndex worker = kNone;
-  absl::Time deadline;
-  absl::Time started;
+  absl::Time deadline;  // of its lease
+  absl::Time started;   // as far as this process knows
   double fraction = 0;
+  JobIndex job = kNone;            // whose limit and whose user's share it counts against; kNone: nobody's
+  std::int32_t memory_raised = 0;  // the limits that it was given, as in Tries
+  std::int32_t time_raised = 0;
+};
+struct Leased {
+  /// One, or two on different workers when the first takes long: the first result counts.
+  std::vector<Attempt> attempts;
 };
 using RunState = std::variant<LookingUp, Ready, Resting, Leased>;
 
@@ -94,7 +102,20 @@ struct Run {
   std::vector<TaskIndex> tasks;
   Tries tries;
   bool saved = false;  // the store has a RunSaved of it
+  /// Serial numbers of the workers that failed it in a way that could be their fault: until `avoid_until` others go first.
+  std::vector<std::int64_t> failed_on;
+  absl::Time avoid_until = absl::InfinitePast();
   RunState state = LookingUp{};
+};
+
+/// What the last attempts of one kind took, for a median that follows the job: takes differ in size, and so do their parts.
+struct RecentTimes {
+  static constexpr std::size_t kKept = 63;
+  std::vector<float> seconds;  // the oldest is written over first
+  std::size_t next = 0;
+  void Add(double value);
+  /// 0 while too few are known.
+  double Median() const;
 };
 
 /// What users see of a task, and what is counted.
@@ -113,8 +134,10 @@ struct Job {
   std::string name;
   std::string user;
   std::int32_t priority = 0;
+  JobTerms terms;
   bool complete = false;  // every task is planned
   bool cancelled = false;
+  bool paused = false;
   bool verify = false;                    // results that exist are read before they are believed
   std::optional<std::string> stopped;     // why nothing more is started: too many bad frames, or the rest cannot be planned
   std::optional<std::string> impossible;  // the part of `stopped` that a retry does not forget
@@ -126,9 +149,34 @@ struct Job {
   std::array<KindCounts, kKinds> counts;
   std::set<TaskIndex> running;
   std::set<TaskIndex> failed;  // of their own doing
+  std::array<RecentTimes, kKinds> recent;
+  /// How many inputs of its tasks of one kind are results of tasks of another: what the stages wait for, without a look at the tasks.
+  std::array<std::array<std::int32_t, kKinds>, kKinds> reads{};
+  /// Ready runs that it wants, in the order of the plan; a run that several jobs want stands with each of them.
+  std::array<std::set<std::pair<TaskIndex, RunIndex>>, kKinds> ready;
+  std::int32_t at_work = 0;  // attempts that count against its limit
+  std::uint32_t listed = 0;  // kinds, as bits, under which its group has it
 
+  bool has_room() const { return terms.workers_max == 0 || at_work < terms.workers_max; }
+  /// Whether it may be given workers for what is ready.
+  bool is_open() const { return !paused && !starts_nothing() && has_room(); }
   bool has_too_many_bad_frames() const { return bad_frames_max >= 0 && bad_frames > bad_frames_max; }
   bool starts_nothing() const { return cancelled || stopped.has_value(); }
+};
+
+/// Whether a worker can be trusted with tasks.
+struct Health {
+  struct Trial {
+    std::uint64_t run = 0;  // the head of its key
+    bool failed = false;    // in a way that could be the worker's fault
+  };
+  std::vector<Trial> trials;  // the last ones, oldest first
+  bool set_aside = false;
+  bool on_probation = false;  // back after a rest, with one slot
+  absl::Time until;           // of the rest
+  std::string reason;
+  std::int32_t rests = 0;      // in a row; each is longer than the one before
+  std::int32_t successes = 0;  // on probation
 };
 
 struct Worker {
@@ -139,14 +187,21 @@ struct Worker {
   bool leaving = false;
   bool silent = false;  // a lease ran out although the stream stands; gets nothing until it is heard again
   std::set<RunIndex> runs;
-  std::int32_t free() const { return connection == 0 || leaving || silent ? 0 : slots - static_cast<std::int32_t>(runs.size()); }
+  std::int64_t serial = 0;  // never used twice, unlike its index
+  Health health;
+  bool is_there() const { return connection != 0 && !leaving && !silent; }
+  std::int32_t free() const {
+    if (!is_there() || health.set_aside) return 0;
+    return (health.on_probation ? 1 : slots) - static_cast<std::int32_t>(runs.size());
+  }
 };
 
-/// Where a ready run stands: earlier jobs first, and within a job the order of the plan, so that a take flows through to its end.
-using Place = std::tuple<JobIndex, TaskIndex, RunIndex>;
-/// One user's ready runs of one priority.
+/// Where a job stands among its user's: the earlier deadline first, then who came first. Jobs without a deadline come last.
+using JobPlace = std::pair<double, JobIndex>;
+/// One user's jobs of one priority that may be given workers, by the kinds of what they have ready. Within a job the order of the plan holds, so
+/// that a take flows through to its end.
 struct Group {
-  std::array<std::set<Place>, kKinds> ready;
+  std::array<std::set<JobPlace>, kKinds> jobs;
 };
 struct GroupKey {
   std::int32_t priority = 0;
@@ -175,10 +230,13 @@ struct State {
   std::vector<WorkerIndex> free_workers;
   absl::flat_hash_map<std::string, WorkerIndex> worker_by_name;
   absl::flat_hash_map<ConnectionId, WorkerIndex> worker_by_connection;
-  std::map<GroupKey, Group> groups;  // never an empty one
-  std::map<std::string, std::int32_t> leased_by_user;
+  std::map<GroupKey, Group> groups;                                              // never an empty one
+  std::map<std::string, std::int32_t> leased_by_user;                            // slots that work for each user, over all priorities
   std::map<std::uint32_t, std::set<std::pair<std::int32_t, WorkerIndex>>> idle;  // by kinds: (−free slots, worker)
-  std::set<std::pair<absl::Time, RunIndex>> deadlines;                           // of leased and resting runs
+  std::set<std::tuple<absl::Time, RunIndex, std::int64_t>> deadlines;            // of attempts, by number, and of resting runs under 0
+  std::set<std::pair<absl::Time, WorkerIndex>> set_aside;                        // by the end of their rest
+  std::int64_t worker_serial = 0;
+  absl::Time copies_next = absl::InfinitePast();  // when tasks that take long are looked for again
   std::int64_t attempt_next = 1;
   std::int64_t attempt_reserved = 1;
   absl::Time last_tick = absl::InfinitePast();
@@ -191,5 +249,6 @@ tasks::TaskSpec SpecOf(const State& state, const Task& task);
 /// Every task is known and has ended; a retry may make it go on.
 bool IsOver(const Job& job);
 const Job* FindJob(const State& state, const std::string& id);
+JobPlace PlaceOf(const Job& job, JobIndex index);
 
 }  // namespace vorocast::core

@@ -21,7 +21,9 @@ void Transition::Settle() {
     if (state_.jobs[job].starts_nothing() || state_.jobs[job].has_too_many_bad_frames()) StopJob(job);
     FlowEndings();
   }
+  if (workers_changed_ && !state_.set_aside.empty()) TakeBackTheLast();
   HandOut();
+  if (copies_due_) CopyStragglers();
   ForgetAbsentWorkers();
   for (const JobIndex job : changed_) effects_.changed_jobs.push_back(state_.jobs[job].id);
 }

@@ -31,6 +31,7 @@ TaskIndex Transition::AddTask(JobIndex job_index, plan::PlannedTask& planned) {
     VOROCAST_CHECK(maker != job.by_name.end());
     read.task = maker->second;
     state_.tasks[read.task].dependents.push_back(index);
+    ++job.reads[static_cast<std::size_t>(task.kind)][static_cast<std::size_t>(state_.tasks[read.task].kind)];
     if (!HasEnded(state_.tasks[read.task])) ++blocked.unmet;
   }
   task.state = blocked;
@@ -76,7 +77,11 @@ void Transition::Leave(TaskIndex index, TaskState next) {
   if (!wanted) return SetTask(index, std::move(next));
   const RunIndex run_index = wanted->run;
   const Run& run = state_.runs[run_index];
-  if (std::holds_alternative<Leased>(run.state)) RecordAttempt(run, state_.tasks[index], {.outcome = AttemptEnded::Outcome::kCancelled});
+  if (const auto* leased = std::get_if<Leased>(&run.state)) {
+    for (const Attempt& attempt : leased->attempts) {
+      RecordAttempt(attempt, state_.tasks[index], {.outcome = AttemptEnded::Outcome::kCancelled});
+    }
+  }
   SetTask(index, std::move(next));
   Unlist(run_index);
   std::erase(state_.runs[run_index].tasks, index);

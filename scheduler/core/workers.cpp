@@ -7,6 +7,12 @@
 #include "scheduler/core/transition.h"
 
 namespace vorocast::core {
+namespace {
+
+/// How often tasks that take long are looked for.
+constexpr absl::Duration kCopiesEvery = absl::Seconds(1);
+
+}  // namespace
 
 void Transition::Enlist(WorkerIndex index) {
   const Worker& worker = state_.workers[index];
@@ -27,8 +33,14 @@ WorkerIndex Transition::AddWorker(const std::string& name) {
     state_.free_workers.pop_back();
   }
   state_.workers[index].name = name;
+  state_.workers[index].serial = ++state_.worker_serial;
   state_.worker_by_name.emplace(name, index);
   return index;
+}
+
+WorkerIndex Transition::Known(const std::string& name) {
+  const auto found = state_.worker_by_name.find(name);
+  return found == state_.worker_by_name.end() ? AddWorker(name) : found->second;
 }
 
 WorkerIndex Transition::WorkerOf(ConnectionId connection) const {
@@ -42,18 +54,18 @@ void Transition::Hear(WorkerIndex index) {
   Enlist(index);
 }
 
-void Transition::Renew(RunIndex index, absl::Time deadline, double fraction) {
-  auto& leased = std::get<Leased>(state_.runs[index].state);
-  state_.deadlines.erase({leased.deadline, index});
-  leased.deadline = deadline;
-  leased.fraction = fraction;
-  state_.deadlines.insert({leased.deadline, index});
-  for (const TaskIndex task : state_.runs[index].tasks) Changed(state_.tasks[task].job);
+void Transition::Renew(const Held& held, absl::Time deadline, double fraction) {
+  Attempt& attempt = *held.attempt;
+  state_.deadlines.erase({attempt.deadline, held.run, attempt.number});
+  attempt.deadline = deadline;
+  attempt.fraction = fraction;
+  state_.deadlines.insert({attempt.deadline, held.run, attempt.number});
+  for (const TaskIndex task : state_.runs[held.run].tasks) Changed(state_.tasks[task].job);
 }
 
 void Transition::On(WorkerConnected& event) {
-  const auto found = state_.worker_by_name.find(event.worker);
-  const WorkerIndex index = found == state_.worker_by_name.end() ? AddWorker(event.worker) : found->second;
+  const WorkerIndex index = Known(event.worker);
+  workers_changed_ = true;
   Worker& worker = state_.workers[index];
   Delist(index);
   if (worker.connection != 0) state_.worker_by_connection.erase(worker.connection);
@@ -69,18 +81,18 @@ void Transition::On(WorkerConnected& event) {
   Welcome welcome;
   std::set<RunIndex> held;
   for (const AttemptId& id : event.holding) {
-    const RunIndex run = FindAttempt(id);
-    const bool current = run != kNone && std::get<Leased>(state_.runs[run].state).worker == index;
+    const Held mine = FindAttempt(id);
+    const bool current = mine.run != kNone && mine.attempt->worker == index;
     (current ? welcome.go_on : welcome.drop).push_back(id);
     if (!current) continue;
-    held.insert(run);
-    Renew(run, now_ + state_.settings.lease, std::get<Leased>(state_.runs[run].state).fraction);
+    held.insert(mine.run);
+    Renew(mine, now_ + state_.settings.lease, mine.attempt->fraction);
   }
   Send(event.connection, std::move(welcome));
   // A lease that got lost on its way.
   const std::set<RunIndex> leased = worker.runs;
   for (const RunIndex run : leased) {
-    if (!held.contains(run)) EndAttempt(run, Cause::kWorkerLost, fmt::format("worker {} came back without it", event.worker));
+    if (!held.contains(run)) EndAttempt(AttemptOf(run, index), Cause::kWorkerLost, fmt::format("worker {} came back without it", event.worker));
   }
 }
 
@@ -91,9 +103,10 @@ void Transition::On(WorkerDisconnected& event) {
   state_.worker_by_connection.erase(event.connection);
   state_.workers[index].connection = 0;
   absent_.push_back(index);
+  workers_changed_ = true;
   for (const RunIndex run : state_.workers[index].runs) {
-    const auto& leased = std::get<Leased>(state_.runs[run].state);
-    Renew(run, std::min(leased.deadline, now_ + state_.settings.grace), leased.fraction);
+    const Held held = AttemptOf(run, index);
+    Renew(held, std::min(held.attempt->deadline, now_ + state_.settings.grace), held.attempt->fraction);
   }
 }
 
@@ -102,6 +115,7 @@ void Transition::On(WorkerLeaving& event) {
   if (index == kNone) return;
   Delist(index);
   state_.workers[index].leaving = true;
+  workers_changed_ = true;
 }
 
 void Transition::On(Heartbeat& event) {
@@ -110,13 +124,13 @@ void Transition::On(Heartbeat& event) {
   Hear(index);
   Revoke unwanted;
   for (const Progress& progress : event.progress) {
-    const RunIndex run = FindAttempt(progress.id);
-    if (run == kNone || std::get<Leased>(state_.runs[run].state).worker != index) {
+    const Held held = FindAttempt(progress.id);
+    if (held.run == kNone || held.attempt->worker != index) {
       unwanted.ids.push_back(progress.id);
-    } else if (state_.runs[run].tasks.empty() && now_ > state_.adoption_ends) {
-      Abandon(run);
+    } else if (state_.runs[held.run].tasks.empty() && now_ > state_.adoption_ends) {
+      Abandon(held.run);
     } else {
-      Renew(run, now_ + state_.settings.lease, std::clamp(progress.fraction, 0.0, 1.0));
+      Renew(held, now_ + state_.settings.lease, std::clamp(progress.fraction, 0.0, 1.0));
     }
   }
   if (!unwanted.ids.empty()) Send(event.connection, std::move(unwanted));
@@ -127,37 +141,51 @@ void Transition::On(Tick&) {
   const absl::Duration gap = now_ - state_.last_tick;
   if (state_.last_tick != absl::InfinitePast() && gap > state_.settings.stall) {
     std::vector<RunIndex> all;
-    for (const auto& [deadline, run] : state_.deadlines) all.push_back(run);
+    for (const auto& [deadline, run, number] : state_.deadlines) all.push_back(run);
+    std::sort(all.begin(), all.end());
+    all.erase(std::unique(all.begin(), all.end()), all.end());
     for (const RunIndex run : all) {
-      if (const auto* leased = std::get_if<Leased>(&state_.runs[run].state)) Renew(run, leased->deadline + gap, leased->fraction);
+      auto* leased = std::get_if<Leased>(&state_.runs[run].state);
+      if (!leased) continue;
+      for (Attempt& attempt : leased->attempts) {
+        attempt.started += gap;
+        Renew({run, &attempt}, attempt.deadline + gap, attempt.fraction);
+      }
     }
   }
   state_.last_tick = now_;
   if (now_ > state_.adoption_ends) {
     for (const auto& [key, tries] : std::exchange(state_.tries_before, {})) effects_.records.emplace_back(std::in_place_type<RunEnded>, key);
   }
-  while (!state_.deadlines.empty() && state_.deadlines.begin()->first <= now_) {
-    const RunIndex index = state_.deadlines.begin()->second;
-    const auto* leased = std::get_if<Leased>(&state_.runs[index].state);
-    if (!leased) {
+  while (!state_.deadlines.empty() && std::get<0>(*state_.deadlines.begin()) <= now_) {
+    const auto [deadline, index, number] = *state_.deadlines.begin();
+    if (!std::holds_alternative<Leased>(state_.runs[index].state)) {
       SetRun(index, Ready{});
       continue;
     }
-    const WorkerIndex worker_index = leased->worker;
+    const Held held = FindAttempt({state_.runs[index].key, number});
+    const WorkerIndex worker_index = held.attempt->worker;
     const Worker& worker = state_.workers[worker_index];
     if (worker.connection != 0) {
-      Send(worker.connection, Revoke{{{state_.runs[index].key, leased->attempt}}});
+      Send(worker.connection, Revoke{{{state_.runs[index].key, number}}});
       Delist(worker_index);
       state_.workers[worker_index].silent = true;
+      workers_changed_ = true;
     }
-    EndAttempt(index, Cause::kWorkerLost, fmt::format("worker {} gave no sign of life", worker.name));
+    EndAttempt(held, Cause::kWorkerLost, fmt::format("worker {} gave no sign of life", worker.name));
+  }
+  EndRests();
+  if (now_ >= state_.copies_next) {
+    state_.copies_next = now_ + kCopiesEvery;
+    copies_due_ = true;
   }
 }
 
 void Transition::ForgetAbsentWorkers() {
   for (const WorkerIndex index : absent_) {
     Worker& worker = state_.workers[index];
-    if (worker.name.empty() || worker.connection != 0 || !worker.runs.empty()) continue;
+    // One that was set aside is not forgiven for coming back.
+    if (worker.name.empty() || worker.connection != 0 || !worker.runs.empty() || worker.health.set_aside) continue;
     state_.worker_by_name.erase(worker.name);
     worker = Worker{};
     state_.free_workers.push_back(index);

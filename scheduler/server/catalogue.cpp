@@ -298,14 +298,30 @@ absl::StatusOr<std::string> Catalogue::Submit(Turn& turn, const std::string& seq
   return id;
 }
 
-absl::Status Catalogue::Retry(Turn& turn, const std::string& id) {
+absl::Status Catalogue::Pause(Turn& turn, const std::string& id, bool paused) {
+  RETURN_IF_ERROR(FindJob(id).status());
+  CatalogueJob& job = jobs_.at(id);
+  const core::Job* known = core::FindJob(turn.state(), id);
+  if (!known || core::IsOver(*known)) {
+    return absl::FailedPreconditionError(fmt::format("job {} has ended; there is nothing to {}", id, paused ? "pause" : "resume"));
+  }
+  job.paused = paused;
+  turn.Apply(core::PauseJob{id, paused});
+  return absl::OkStatus();
+}
+
+absl::Status Catalogue::Retry(Turn& turn, const std::string& id, const core::JobTerms& terms) {
   RETURN_IF_ERROR(FindJob(id).status());
   CatalogueJob& job = jobs_.at(id);
   const CatalogueJob before = job;
   job.ended = false;
   job.ended_at = 0;
+  const bool limited = terms.memory_limit != job.added.terms.memory_limit || terms.time_factor != job.added.terms.time_factor;
+  job.added.terms = terms;
   if (core::FindJob(turn.state(), id)) {
-    turn.Apply(core::RetryJob{id});
+    core::RetryJob retry{.job = id};
+    if (limited) retry.memory_limit = terms.memory_limit, retry.time_factor = terms.time_factor;
+    turn.Apply(retry);
     return absl::OkStatus();
   }
   Follow(id);
@@ -317,6 +333,7 @@ absl::Status Catalogue::Retry(Turn& turn, const std::string& id) {
     return readable;
   }
   turn.Record(core::Record(core::JobRetried{id}));
+  if (limited) turn.Record(core::Record(core::JobLimited{id, terms.memory_limit, terms.time_factor}));
   core::JobSubmitted submitted = Submission(job);
   submitted.verify = true;
   turn.Apply(std::move(submitted));

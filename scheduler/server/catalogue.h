@@ -50,7 +50,10 @@ class Catalogue {
   /// A second take of the spec is known to be there. Returns the job's id.
   absl::StatusOr<std::string> Submit(Turn& turn, const std::string& sequence, const std::string& user, std::int32_t priority, plan::JobSpec spec,
                                      const core::JobTerms& terms = {});
-  absl::Status Retry(Turn& turn, const std::string& job);
+  /// Under other limits, if `terms` has others than the job.
+  absl::Status Retry(Turn& turn, const std::string& job, const core::JobTerms& terms);
+  /// FAILED_PRECONDITION for a job that has ended.
+  absl::Status Pause(Turn& turn, const std::string& job, bool paused);
   /// Notes when the job ended, in seconds since 1970, unless that is known.
   void NoteEnd(const std::string& job, double at);
   /// Notes that the job has ended and is on record.

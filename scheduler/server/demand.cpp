@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "scheduler/server/demand.h"
 
+#include <algorithm>
+
 namespace vorocast::server {
 namespace {
 
@@ -23,10 +25,12 @@ fleet::Demand DemandOf(const core::State& state) {
     for (const core::Job& job : state.jobs) {
       const core::KindCounts& counts = job.counts[index];
       fleet::KindDemand of_job{.running = CountOf(counts, core::Phase::kRunning)};
-      if (!job.starts_nothing()) {
+      if (!job.starts_nothing() && !job.paused) {
         of_job.ready = CountOf(counts, core::Phase::kReady);
         of_job.blocked = CountOf(counts, core::Phase::kBlocked);
       }
+      // More workers than it may have would only stand by.
+      if (job.terms.workers_max > 0) of_job.ready = std::min(of_job.ready, std::max(0, job.terms.workers_max - job.at_work));
       if (of_job.ready + of_job.running + of_job.blocked == 0) continue;
       // Takes differ in size: what other jobs needed is only a guess.
       if (measured > 0) of_job.seconds_mean = seconds / measured;

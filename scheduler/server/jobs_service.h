@@ -30,10 +30,13 @@ class JobsService final : public v1::Jobs::CallbackService {
   grpc::ServerUnaryReactor* Explain(grpc::CallbackServerContext* context, const v1::ExplainRequest* request, v1::ExplainReply* reply) override;
   grpc::ServerUnaryReactor* Cancel(grpc::CallbackServerContext* context, const v1::JobRequest* request, v1::Job* reply) override;
   grpc::ServerUnaryReactor* Retry(grpc::CallbackServerContext* context, const v1::RetryJobRequest* request, v1::Job* reply) override;
+  grpc::ServerUnaryReactor* Pause(grpc::CallbackServerContext* context, const v1::JobRequest* request, v1::Job* reply) override;
+  grpc::ServerUnaryReactor* Resume(grpc::CallbackServerContext* context, const v1::JobRequest* request, v1::Job* reply) override;
   grpc::ServerWriteReactor<v1::FetchChunk>* Fetch(grpc::CallbackServerContext* context, const v1::FetchRequest* request) override;
   grpc::ServerWriteReactor<v1::AttemptsReply>* Attempts(grpc::CallbackServerContext* context, const v1::AttemptsRequest* request) override;
 
  private:
+  grpc::ServerUnaryReactor* SetPaused(grpc::CallbackServerContext* context, const v1::JobRequest* request, v1::Job* reply, bool paused);
   struct OutputFile {
     std::filesystem::path path;
     std::string sha256;

@@ -194,7 +194,7 @@ TEST(Core, AHangingWorkerLosesItsLeaseAfterTenSecondsAndGetsNoOther) {
 }
 
 TEST(Core, CausesDecideAboutTheNextAttempt) {
-  const std::vector<std::pair<Cause, int>> attempts = {{Cause::kInput, 1},    {Cause::kCrashed, 3},     {Cause::kTimedOut, 3},
+  const std::vector<std::pair<Cause, int>> attempts = {{Cause::kInput, 1},    {Cause::kCrashed, 3},     {Cause::kTimedOut, 2},
                                                        {Cause::kInternal, 3}, {Cause::kOutOfMemory, 2}, {Cause::kDrained, 11}};
   for (const auto& [cause, expected] : attempts) {
     Bench bench;
@@ -202,6 +202,7 @@ TEST(Core, CausesDecideAboutTheNextAttempt) {
     bench.Connect(1, "w");
     int made = 0;
     std::int64_t memory = 0;
+    absl::Duration time;
     while (std::holds_alternative<Wanted>(bench.state.tasks[0].state)) {
       const auto leases = bench.TakeLeases(1);
       ASSERT_FALSE(leases.empty());
@@ -213,7 +214,11 @@ TEST(Core, CausesDecideAboutTheNextAttempt) {
       if (cause == Cause::kOutOfMemory && made == 2) {
         EXPECT_EQ(leases[0].memory_limit, 2 * memory);
       }
+      if (cause == Cause::kTimedOut && made == 2) {
+        EXPECT_EQ(leases[0].time_limit, 2 * time);
+      }
       memory = leases[0].memory_limit;
+      time = leases[0].time_limit;
       bench.Fail(1, leases[0].id, cause);
     }
     EXPECT_EQ(made, expected) << Name(cause);
