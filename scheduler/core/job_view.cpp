@@ -2,9 +2,10 @@
 #include "scheduler/core/job_view.h"
 
 #include <algorithm>
-#include <optional>
 
 #include <fmt/format.h>
+
+#include "scheduler/core/forecast.h"
 
 namespace vorocast::core {
 namespace {
@@ -14,75 +15,6 @@ std::int32_t Total(const Job& job, Phase phase) {
   std::int32_t total = 0;
   for (const KindCounts& counts : job.counts) total += Of(counts, phase);
   return total;
-}
-
-std::int32_t SlotsFor(const State& state, tasks::Kind kind) {
-  std::int32_t slots = 0;
-  for (const Worker& worker : state.workers) {
-    if (worker.connection != 0 && (worker.kinds & (1u << static_cast<unsigned>(kind)))) slots += worker.slots;
-  }
-  return slots;
-}
-
-/// Seconds of each kind's task in a take of so many frames, on one core with 5000 cells and 65 thousand points: only their proportions
-/// matter, for kinds that the job has not measured yet.
-double TypicalSeconds(tasks::Kind kind, std::int32_t frames) {
-  switch (kind) {
-    case tasks::Kind::kTessellate:
-      return 1.1;
-    case tasks::Kind::kTemplate:
-      return 4;
-    case tasks::Kind::kStretch:
-      return 3;
-    case tasks::Kind::kGuide:
-      return 2 + 0.01 * frames;
-    case tasks::Kind::kTrack:
-      return 3;
-    case tasks::Kind::kAssemble:
-      return 0.03 * frames;
-    case tasks::Kind::kSimulate:
-      return 2 + 0.1 * frames;
-    case tasks::Kind::kSheet:
-      return 15;
-    case tasks::Kind::kRender:
-      return 5;
-    case tasks::Kind::kEncode:
-      return 0.3 * frames;
-  }
-  return 1;
-}
-
-/// How much slower than typical this job's tasks have been so far; nothing while none has been measured.
-std::optional<double> Slowness(const std::vector<StageView>& stages, std::int32_t frames) {
-  double measured = 0;
-  double typical = 0;
-  for (const StageView& stage : stages) {
-    const std::int32_t computed = stage.done - stage.reused;
-    if (stage.seconds_mean <= 0 || computed <= 0) continue;
-    measured += computed * stage.seconds_mean;
-    typical += computed * TypicalSeconds(stage.kind, frames);
-  }
-  if (typical <= 0) return std::nullopt;
-  return measured / typical;
-}
-
-/// Stages one after the other, each spread over its workers. Unknown until something has been measured, all tasks are known, and every kind
-/// with work left has a worker.
-double SecondsLeft(const State& state, const Job& job, const std::vector<StageView>& stages) {
-  if (!job.complete) return -1;
-  const std::int32_t frames = stages.empty() ? 0 : stages.front().total;
-  const std::optional<double> slowness = Slowness(stages, frames);
-  double seconds = 0;
-  for (const StageView& stage : stages) {
-    const double left = stage.total * (1 - stage.fraction) - stage.failed - stage.cancelled;
-    if (left <= 1e-9) continue;
-    const std::int32_t slots = std::min(SlotsFor(state, stage.kind), std::max(1, stage.total));
-    if (slots == 0) return -1;
-    if (stage.seconds_mean <= 0 && !slowness) return -1;
-    const double each = stage.seconds_mean > 0 ? stage.seconds_mean : *slowness * TypicalSeconds(stage.kind, frames);
-    seconds += left * each / slots;
-  }
-  return seconds;
 }
 
 }  // namespace

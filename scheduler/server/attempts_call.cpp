@@ -63,13 +63,15 @@ std::vector<v1::TaskAttempt> RunningAttempts(const core::State& state, const cor
     if (!wanted || (!task.empty() && task != at_work.name)) continue;
     const auto* leased = std::get_if<core::Leased>(&state.runs[wanted->run].state);
     if (!leased) continue;
-    v1::TaskAttempt& message = running.emplace_back();
-    message.set_task(at_work.name);
-    message.set_kind(std::string(tasks::Name(at_work.kind)));
-    message.set_number(leased->attempt);
-    message.set_worker(state.workers[leased->worker].name);
-    message.set_started(UnixSeconds(now - (monotonic_now - leased->started)));
-    message.set_outcome(v1::RUNNING);
+    for (const core::Attempt& attempt : leased->attempts) {
+      v1::TaskAttempt& message = running.emplace_back();
+      message.set_task(at_work.name);
+      message.set_kind(std::string(tasks::Name(at_work.kind)));
+      message.set_number(attempt.number);
+      message.set_worker(state.workers[attempt.worker].name);
+      message.set_started(UnixSeconds(now - (monotonic_now - attempt.started)));
+      message.set_outcome(v1::RUNNING);
+    }
   }
   std::sort(running.begin(), running.end(), [](const v1::TaskAttempt& a, const v1::TaskAttempt& b) { return a.number() < b.number(); });
   return running;

@@ -10,6 +10,7 @@
 #include "scheduler/core/job_view.h"
 #include "scheduler/server/archive.h"
 #include "scheduler/server/attempts_call.h"
+#include "scheduler/server/fleet_message.h"
 #include "scheduler/server/job_message.h"
 #include "scheduler/server/job_request.h"
 #include "scheduler/server/unary_call.h"
@@ -99,6 +100,7 @@ grpc::ServerUnaryReactor* JobsService::List(grpc::CallbackServerContext* context
                                              if (!session.empty() && sequence->opened.session != session) continue;
                                              ASSIGN_OR_RETURN(*list.add_jobs(), JobMessage(turn.state(), catalogue_, *job, FrameOutputs::kLeftOut));
                                            }
+                                           FillFleet(turn.state(), *list.mutable_fleet());
                                            return absl::OkStatus();
                                          });
 }
@@ -131,7 +133,7 @@ grpc::ServerUnaryReactor* JobsService::Explain(grpc::CallbackServerContext* cont
     }
     const auto explain = [&]() -> absl::StatusOr<std::string> {
       RETURN_IF_ERROR(known);
-      if (request->task().empty()) return core::Explain(turn.state(), *job);
+      if (request->task().empty()) return core::Explain(turn.state(), *job) + ExplainLateness(turn.state(), *job, WallSeconds());
       return core::Explain(turn.state(), *job, request->task());
     };
     auto text = explain();
@@ -151,9 +153,25 @@ grpc::ServerUnaryReactor* JobsService::Cancel(grpc::CallbackServerContext* conte
 
 grpc::ServerUnaryReactor* JobsService::Retry(grpc::CallbackServerContext* context, const v1::RetryJobRequest* request, v1::Job* reply) {
   return AnswerInTurn<v1::Job>(context, engine_, reply, [this, request](Turn& turn, v1::Job& job) -> absl::Status {
-    RETURN_IF_ERROR(catalogue_.Retry(turn, request->job_id()));
+    ASSIGN_OR_RETURN(const CatalogueJob* known, catalogue_.FindJob(request->job_id()));
+    core::JobTerms terms = known->added.terms;
+    RETURN_IF_ERROR(SetLimits(*request, terms));
+    RETURN_IF_ERROR(catalogue_.Retry(turn, request->job_id(), terms));
     return Show(turn, request->job_id(), job);
   });
+}
+
+grpc::ServerUnaryReactor* JobsService::SetPaused(grpc::CallbackServerContext* context, const v1::JobRequest* request, v1::Job* reply, bool paused) {
+  return AnswerInTurn<v1::Job>(context, engine_, reply, [this, request, paused](Turn& turn, v1::Job& job) -> absl::Status {
+    RETURN_IF_ERROR(catalogue_.Pause(turn, request->job_id(), paused));
+    return Show(turn, request->job_id(), job);
+  });
+}
+grpc::ServerUnaryReactor* JobsService::Pause(grpc::CallbackServerContext* context, const v1::JobRequest* request, v1::Job* reply) {
+  return SetPaused(context, request, reply, true);
+}
+grpc::ServerUnaryReactor* JobsService::Resume(grpc::CallbackServerContext* context, const v1::JobRequest* request, v1::Job* reply) {
+  return SetPaused(context, request, reply, false);
 }
 
 grpc::ServerWriteReactor<v1::FetchChunk>* JobsService::Fetch(grpc::CallbackServerContext*, const v1::FetchRequest* request) {

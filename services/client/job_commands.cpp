@@ -154,6 +154,21 @@ void AddFetch(CLI::App& program, int& exit_code) {
   });
 }
 
+void AddRetry(CLI::App& program, int& exit_code) {
+  auto limits = std::make_shared<LimitFlags>();
+  const JobAction retry = [limits](SchedulerClient& client, const std::string& job_id) -> absl::Status {
+    v1::RetryJobRequest request;
+    request.set_job_id(job_id);
+    request.set_time_factor(limits->time_factor);
+    ASSIGN_OR_RETURN(const std::int64_t memory, limits->MemoryLimit());
+    request.set_memory_limit(memory);
+    ASSIGN_OR_RETURN(const v1::Job job, client.Retry(request));
+    fmt::print("{}", DescribeJob(job));
+    return absl::OkStatus();
+  };
+  limits->AddTo(AddJobCommand(program, exit_code, "retry", "Try a job's failed and cancelled tasks again, under other limits if need be", retry));
+}
+
 }  // namespace
 
 void AddJobCommands(CLI::App& program, int& exit_code) {
@@ -170,12 +185,18 @@ void AddJobCommands(CLI::App& program, int& exit_code) {
                   fmt::print("{}", DescribeJob(job));
                   return absl::OkStatus();
                 });
-  AddJobCommand(program, exit_code, "retry", "Try a job's failed and cancelled tasks again",
+  AddJobCommand(program, exit_code, "pause", "Start nothing further of a job; what runs goes on to its end",
                 [](SchedulerClient& client, const std::string& job_id) -> absl::Status {
-                  ASSIGN_OR_RETURN(const v1::Job job, client.Retry(job_id));
+                  ASSIGN_OR_RETURN(const v1::Job job, client.Pause(job_id));
                   fmt::print("{}", DescribeJob(job));
                   return absl::OkStatus();
                 });
+  AddJobCommand(program, exit_code, "resume", "Let a paused job go on", [](SchedulerClient& client, const std::string& job_id) -> absl::Status {
+    ASSIGN_OR_RETURN(const v1::Job job, client.Resume(job_id));
+    fmt::print("{}", DescribeJob(job));
+    return absl::OkStatus();
+  });
+  AddRetry(program, exit_code);
   AddFetch(program, exit_code);
 }
 

@@ -130,6 +130,7 @@ void JobFlags::AddTo(CLI::App& command) {
       ->capture_default_str()
       ->check(CLI::IsMember({"lattice", "random"}));
   command.add_option("--priority", priority, "Larger goes first")->capture_default_str();
+  schedule.AddTo(command);
   command.add_flag("--no-sheets", no_sheets, "Make no contact sheets");
   command.add_flag("--film", film, "Render every instant as OpenEXR, and a movie of them (docs/film.md)");
   command.add_option("--film-size", film_size, "Width x height in pixels")->capture_default_str();
@@ -155,6 +156,7 @@ absl::StatusOr<v1::SubmitJobRequest> JobFlags::Parse() const {
   request.set_indicator(indicator);
   request.set_start(start);
   request.set_user(UserName());
+  RETURN_IF_ERROR(schedule.Fill(request));
   if (template_frame == "auto") {
     request.set_template_frame(-1);
   } else {

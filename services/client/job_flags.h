@@ -10,6 +10,7 @@
 #include "proto/jobs.pb.h"
 #include "services/base/status.h"
 #include "services/capture/capture.h"
+#include "services/client/schedule_flags.h"
 
 namespace vorocast::client {
 
@@ -42,6 +43,7 @@ struct JobFlags {
   std::string film_size = "1920x1080", colour = "capture", camera;
   std::int32_t samples = 4;
   double shutter = 0.5;
+  ScheduleFlags schedule;
 
   void AddTo(CLI::App& command);
   /// Everything but the sequence. The effect is read and checked here, so that a mistake in it is told before anything is sent.

@@ -9,6 +9,9 @@
 
 #include <fmt/format.h>
 
+#include "absl/time/clock.h"
+#include "services/client/schedule_flags.h"
+
 namespace vorocast::client {
 namespace {
 
@@ -20,7 +23,10 @@ std::string Bar(double fraction) {
   return std::string(static_cast<std::size_t>(full), '#') + std::string(static_cast<std::size_t>(kBarWidth - full), '.');
 }
 
+double Now() { return absl::ToDoubleSeconds(absl::Now() - absl::UnixEpoch()); }
+
 std::string StateText(const v1::Job& job) {
+  if (job.paused() && !HasEnded(job)) return "paused";
   switch (job.state()) {
     case v1::DONE:
       return "done";
@@ -65,7 +71,7 @@ std::string TakesOf(const v1::Job& job) {
 std::string DescribeJob(const v1::Job& job) {
   std::string text = fmt::format("{} ({}): {}", TakesOf(job), job.id(), StateText(job));
   if (!HasEnded(job) && job.seconds_left() >= 0) text += fmt::format(", about {} left", FormatDuration(job.seconds_left()));
-  text += "\n";
+  text += DescribeLateness(job, Now()) + "\n";
   for (const v1::Stage& stage : job.stages()) text += DescribeStage(stage);
   for (const v1::FailedTask& failure : job.failures())
     text += fmt::format("  failed: {}\n", failure.cause().starts_with(failure.label()) ? failure.cause() : failure.label() + ": " + failure.cause());
@@ -78,9 +84,9 @@ std::string DescribeJobLine(const v1::Job& job) {
     if (stage.done() == stage.total() && stage.reused() == stage.total()) continue;
     text += fmt::format("{}{} {}/{}", text.empty() ? "" : " · ", stage.kind(), stage.done(), stage.total());
   }
-  if (text.empty() || HasEnded(job)) text = text.empty() ? StateText(job) : StateText(job) + ": " + text;
+  if (text.empty() || HasEnded(job) || job.paused()) text = text.empty() ? StateText(job) : StateText(job) + ": " + text;
   if (!HasEnded(job) && job.seconds_left() >= 0) text += fmt::format(" · about {} left", FormatDuration(job.seconds_left()));
-  return text;
+  return text + DescribeLateness(job, Now());
 }
 
 JobView::JobView() : terminal_(isatty(STDOUT_FILENO) == 1) {}

@@ -187,10 +187,18 @@ absl::StatusOr<v1::Job> SchedulerClient::Cancel(const std::string& job_id) {
   return Call(&Scheduler::jobs, &v1::Jobs::Stub::Cancel, request);
 }
 
-absl::StatusOr<v1::Job> SchedulerClient::Retry(const std::string& job_id) {
-  v1::RetryJobRequest request;
+absl::StatusOr<v1::Job> SchedulerClient::Retry(const v1::RetryJobRequest& request) { return Call(&Scheduler::jobs, &v1::Jobs::Stub::Retry, request); }
+
+absl::StatusOr<v1::Job> SchedulerClient::Pause(const std::string& job_id) {
+  v1::JobRequest request;
   request.set_job_id(job_id);
-  return Call(&Scheduler::jobs, &v1::Jobs::Stub::Retry, request);
+  return Call(&Scheduler::jobs, &v1::Jobs::Stub::Pause, request);
+}
+
+absl::StatusOr<v1::Job> SchedulerClient::Resume(const std::string& job_id) {
+  v1::JobRequest request;
+  request.set_job_id(job_id);
+  return Call(&Scheduler::jobs, &v1::Jobs::Stub::Resume, request);
 }
 
 absl::StatusOr<std::string> SchedulerClient::Explain(const std::string& job_id, const std::string& task) {

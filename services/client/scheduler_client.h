@@ -45,7 +45,9 @@ class SchedulerClient {
   /// One result or captured frame ("capture/frame_000412.ply"). RESOURCE_EXHAUSTED when it has more than `bytes_max`.
   absl::StatusOr<std::string> FetchBytes(const std::string& job_id, const std::string& name, std::int64_t bytes_max);
   absl::StatusOr<v1::Job> Cancel(const std::string& job_id);
-  absl::StatusOr<v1::Job> Retry(const std::string& job_id);
+  absl::StatusOr<v1::Job> Retry(const v1::RetryJobRequest& request);
+  absl::StatusOr<v1::Job> Pause(const std::string& job_id);
+  absl::StatusOr<v1::Job> Resume(const std::string& job_id);
   absl::StatusOr<std::string> Explain(const std::string& job_id, const std::string& task);
 
   /// Calls `seen` with the job now and after each change until it has ended; returns its last state. Asks `interrupted` ten times a second

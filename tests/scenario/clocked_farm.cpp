@@ -71,7 +71,12 @@ class ClockedFarm {
     Mail mail = mail_.top();
     mail_.pop();
     now_ = mail.at;
-    if (std::holds_alternative<core::Tick>(mail.event)) Post(kTick, core::Tick{});
+    if (std::holds_alternative<core::Tick>(mail.event)) {
+      Post(kTick, core::Tick{});
+      if (const double left = core::View(state_, state_.jobs[0]).seconds_left; left >= 0) {
+        run_.forecasts.emplace_back(absl::ToDoubleSeconds(now_ - begin_), left);
+      }
+    }
     if (auto* beat = std::get_if<core::Heartbeat>(&mail.event)) {
       Post(times_.heartbeat, core::Heartbeat{.connection = beat->connection});
       if (const auto held = held_.find(beat->connection); held != held_.end()) beat->progress.push_back({.id = held->second});
@@ -106,7 +111,9 @@ class ClockedFarm {
     const absl::Duration after = held + 2 * times_.message;
     held_[worker] = lease.id;
     run_.ended_s[index] = std::max(run_.ended_s[index], absl::ToDoubleSeconds(now_ + after - begin_));
-    Post(after, core::Finished{.connection = worker, .id = lease.id, .outcome = core::Succeeded{.result = {.sha256 = lease.id.key, .size = 1}}});
+    Post(after,
+         core::Finished{
+             .connection = worker, .id = lease.id, .outcome = core::Succeeded{.result = {.sha256 = lease.id.key, .size = 1, .seconds = seconds}}});
   }
 
   const FarmTimes& times_;

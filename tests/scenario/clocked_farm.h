@@ -35,6 +35,8 @@ struct FarmRun {
   std::int64_t tasks = 0;
   std::array<double, core::kKinds> ended_s{};  // when the last task of each kind ended
   std::array<double, core::kKinds> spent_s{};
+  /// What the scheduler said on the way: when, and how long it would still take.
+  std::vector<std::pair<double, double>> forecasts;
 };
 
 /// One closed take, tracked by so many workers of one slot. INTERNAL when it does not end as a job should.

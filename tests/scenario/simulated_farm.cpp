@@ -2,18 +2,19 @@
 #include "tests/scenario/simulated_farm.h"
 
 #include <algorithm>
+#include <utility>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "scheduler/core/check.h"
 #include "scheduler/core/job_view.h"
+#include "tests/scenario/choice_oracle.h"
 
 namespace vorocast::scenario {
 namespace {
 
 constexpr absl::Duration kTick = absl::Milliseconds(100);
-constexpr absl::Duration kHeartbeat = absl::Seconds(2);
 constexpr absl::Duration kPatience = absl::Minutes(30);  // of simulated calm, after which what has not ended is stuck
 constexpr std::int64_t kWorkers = 4;
 constexpr std::int64_t kKeysEvery = 97;  // steps; no divisor of anything that repeats
@@ -37,24 +38,6 @@ SimulatedFarm::SimulatedFarm(std::uint64_t seed, Weather weather) : random_(seed
   SubmitJobs();
 }
 
-void SimulatedFarm::SubmitJobs() {
-  const std::uint64_t count = 1 + random_.Below(3);
-  for (std::uint64_t i = 0; i < count; ++i) {
-    plan::JobSpec spec;
-    spec.window_frames = 4;
-    spec.overlap_frames = 1;
-    spec.patches = 10;
-    spec.interpolated_max = static_cast<std::int32_t>(random_.Below(4)) - 1;
-    spec.template_frame = Chance(0.5) ? 0 : -1;
-    spec.sheets = Chance(0.5);
-    spec.effect = Chance(0.5) ? nlohmann::json{{"name", "pendulum"}, {"strength", static_cast<std::int32_t>(random_.Below(2))}} : nlohmann::json();
-    memory_.jobs.push_back({.id = fmt::format("j{}", memory_.jobs.size() + 1),
-                            .user = Chance(0.5) ? "anna" : "bert",
-                            .priority = static_cast<std::int32_t>(random_.Below(2)),
-                            .spec = std::move(spec)});
-  }
-}
-
 absl::Status SimulatedFarm::Wrong(const std::string& what) const { return absl::InternalError(fmt::format("after {} steps: {}", steps_, what)); }
 
 absl::Status SimulatedFarm::Check(const core::State& state) const {
@@ -68,7 +51,12 @@ absl::Status SimulatedFarm::Happen(core::Event event) {
   const bool succeeded = finished && std::holds_alternative<core::Succeeded>(finished->outcome);
   const base::Digest key = finished ? finished->id.key : base::Digest{};
   const bool is_tick = std::holds_alternative<core::Tick>(event);
+  set_aside_ += !state_.set_aside.empty();
+  // What a restart takes up was decided by somebody else.
+  const auto* restored = std::get_if<core::Restored>(&event);
+  const std::int64_t attempt_next = restored ? restored->attempt_next : state_.attempt_next;
   core::Effects effects = core::Step(state_, std::move(event), now_);
+  if (const absl::Status status = CheckChoices(state_, attempt_next); !status.ok()) return Wrong(std::string(status.message()));
   const bool idle = is_tick && effects.records.empty() && effects.messages.empty() && effects.changed_jobs.empty();
   if (!idle) RETURN_IF_ERROR(Check(state_));
   for (const core::Record& record : effects.records) {
@@ -97,6 +85,8 @@ absl::Status SimulatedFarm::Apply(core::Effects effects) {
 
 absl::Status SimulatedFarm::Commit(const std::vector<core::Record>& records) {
   for (const core::Record& record : records) {
+    const auto* saved = std::get_if<core::RunSaved>(&record);
+    copied_ += saved && !saved->copy_worker.empty();
     const auto* made = std::get_if<core::ResultMade>(&record);
     if (made && ++accepted_[made->key] > 1) return Wrong(fmt::format("the result {} was accepted twice", made->key.Short()));
   }
@@ -161,122 +151,11 @@ absl::Status SimulatedFarm::Lead() {
   absl::Status status = Happen(std::move(restored));
   for (std::size_t i = 0; status.ok() && i < memory_.jobs.size(); ++i) {
     const SimulatedStore::SubmittedJob job = memory_.jobs[i];
-    core::JobSubmitted submitted{.id = job.id, .name = "take", .user = job.user, .priority = job.priority, .cancelled = job.cancelled};
-    for (const auto& [task, failure] : job.failures) submitted.failures.push_back(failure);
-    status = Happen(std::move(submitted));
+    status = Happen(Submission(job));
     if (status.ok()) status = Plan(job);
   }
   starting_ = false;
   return status;
-}
-
-void SimulatedFarm::Break(core::ConnectionId connection) {
-  to_worker_.erase(connection);
-  // What was on its way is lost with the stream; that it broke is noticed at once.
-  to_scheduler_[connection].clear();
-  to_scheduler_[connection].push_back({now_ + Delay(), core::WorkerDisconnected{connection}});
-  for (SimulatedWorker& worker : workers_) {
-    if (worker.connection != connection) continue;
-    worker.connection = 0;
-    worker.welcomed = false;
-    worker.connects_at = now_ + absl::Milliseconds(static_cast<std::int64_t>(random_.Below(3000)));
-  }
-}
-
-void SimulatedFarm::Post(core::ConnectionId connection, core::Event event) {
-  if (connection == 0) return;
-  if (!calm_ && Chance(weather_.message_lost)) return Break(connection);
-  auto& stream = to_scheduler_[connection];
-  const absl::Time after = stream.empty() ? now_ : stream.back().at;
-  stream.push_back({std::max(after, now_ + Delay()), std::move(event)});
-}
-
-void SimulatedFarm::Connect(SimulatedWorker& worker) {
-  worker.connection = ++last_connection_;
-  // Somebody may still know the old address.
-  if (replaced_ && Chance(0.2)) to_replaced_.insert(worker.connection);
-  worker.beats_at = now_ + kHeartbeat;
-  to_worker_[worker.connection];
-  core::WorkerConnected hello{.connection = worker.connection, .worker = worker.name, .kinds = worker.kinds, .slots = worker.slots};
-  for (const auto& [id, attempt] : worker.held) hello.holding.push_back(id);
-  Post(worker.connection, std::move(hello));
-}
-
-void SimulatedFarm::StartAttempt(SimulatedWorker& worker, const core::Lease& lease) {
-  Attempt attempt{.id = lease.id, .spec_json = lease.spec_json};
-  attempt.ends = now_ + absl::Milliseconds(static_cast<std::int64_t>(random_.Below(4000)));
-  worker.held.emplace(lease.id, std::move(attempt));
-}
-
-core::Finished SimulatedFarm::Outcome(const SimulatedWorker& worker, const Attempt& attempt) {
-  core::Finished finished{.connection = worker.connection, .id = attempt.id};
-  const auto spec = nlohmann::json::parse(attempt.spec_json);
-  const bool is_bad = spec["kind"] == "tessellate" && bad_frames_.contains(spec["inputs"][0]["frame"].get<std::int32_t>());
-  if (is_bad) {
-    finished.outcome = core::AttemptFailed{core::Cause::kInput, "normals are not finite"};
-  } else if (!calm_ && Chance(weather_.attempt_fails)) {
-    constexpr core::Cause kCauses[] = {core::Cause::kCrashed, core::Cause::kOutOfMemory, core::Cause::kTimedOut,
-                                       core::Cause::kStore,   core::Cause::kInternal,    core::Cause::kDrained};
-    finished.outcome = core::AttemptFailed{kCauses[random_.Below(std::size(kCauses))], "bad luck"};
-  } else {
-    finished.outcome = core::Succeeded{{.sha256 = attempt.id.key, .size = 1, .seconds = 1}};
-  }
-  return finished;
-}
-
-void SimulatedFarm::MoveWorker(SimulatedWorker& worker) {
-  if (now_ < worker.silent_until) return;
-  if (!calm_) {
-    if (Chance(weather_.worker_hangs)) worker.silent_until = now_ + absl::Seconds(static_cast<std::int64_t>(random_.Below(30)));
-    if (worker.connection != 0 && Chance(weather_.stream_breaks)) Break(worker.connection);
-    if (Chance(weather_.worker_dies)) {
-      if (worker.connection != 0) Break(worker.connection);
-      worker.held.clear();
-      worker.name = fmt::format("worker-{}", ++last_worker_);
-      return;
-    }
-  }
-  if (worker.connection == 0 && now_ >= worker.connects_at) Connect(worker);
-  for (auto& [id, attempt] : worker.held) {
-    if (attempt.report || now_ < attempt.ends) continue;
-    attempt.report = Outcome(worker, attempt);
-    if (std::holds_alternative<core::Succeeded>(attempt.report->outcome)) files_.insert(id.key);
-    if (!worker.welcomed) continue;  // told after the welcome
-    const core::ConnectionId connection = worker.connection;
-    Post(connection, *attempt.report);
-    if (!calm_ && Chance(weather_.message_doubled)) Post(worker.connection, *attempt.report);
-  }
-  if (worker.welcomed && now_ >= worker.beats_at) {
-    worker.beats_at = now_ + kHeartbeat;
-    core::Heartbeat beat{.connection = worker.connection};
-    for (const auto& [id, attempt] : worker.held) {
-      if (!attempt.report) beat.progress.push_back({id, 0.5});
-    }
-    Post(worker.connection, std::move(beat));
-  }
-}
-
-void SimulatedFarm::Receive(const core::Message& message) {
-  const auto found = std::find_if(workers_.begin(), workers_.end(), [&](const SimulatedWorker& w) { return w.connection == message.connection; });
-  if (found == workers_.end()) return;
-  SimulatedWorker& worker = *found;
-  const auto drop = [&worker](const std::vector<core::AttemptId>& ids) {
-    for (const core::AttemptId& id : ids) worker.held.erase(id);
-  };
-  if (const auto* welcome = std::get_if<core::Welcome>(&message.content)) {
-    worker.welcomed = true;
-    drop(welcome->drop);
-    for (auto& [id, attempt] : worker.held) {
-      if (!attempt.report) continue;
-      attempt.report->connection = worker.connection;
-      Post(worker.connection, *attempt.report);
-    }
-  }
-  if (const auto* leases = std::get_if<core::Leases>(&message.content)) {
-    for (const core::Lease& lease : leases->leases) StartAttempt(worker, lease);
-  }
-  if (const auto* acknowledged = std::get_if<core::Acknowledge>(&message.content)) drop(acknowledged->ids);
-  if (const auto* revoke = std::get_if<core::Revoke>(&message.content)) drop(revoke->ids);
 }
 
 absl::Status SimulatedFarm::Deliver() {
@@ -320,30 +199,11 @@ absl::Status SimulatedFarm::DeliverAnswers() {
   return absl::OkStatus();
 }
 
-absl::Status SimulatedFarm::ActAsUser() {
-  const std::string job = memory_.jobs[random_.Below(memory_.jobs.size())].id;
-  switch (random_.Below(3)) {
-    case 0:
-      return Happen(core::CancelJob{job});
-    case 1:
-      return Happen(core::RetryJob{job});
-    default: {
-      const std::size_t before = memory_.jobs.size();
-      if (before > 5) return absl::OkStatus();
-      SubmitJobs();
-      for (std::size_t i = before; i < memory_.jobs.size(); ++i) {
-        const SimulatedStore::SubmittedJob added = memory_.jobs[i];
-        RETURN_IF_ERROR(Happen(core::JobSubmitted{.id = added.id, .name = "take", .user = added.user, .priority = added.priority}));
-        RETURN_IF_ERROR(Plan(added));
-      }
-      return absl::OkStatus();
-    }
-  }
-}
-
 absl::Status SimulatedFarm::Tick() {
   now_ += kTick;
-  calm_ = now_ >= calm_at_;
+  if (!calm_ && Chance(weather_.clock_jumps)) now_ += absl::Seconds(static_cast<std::int64_t>(random_.Below(600)));
+  const bool was_calm = std::exchange(calm_, now_ >= calm_at_);
+  if (calm_ && !was_calm) RETURN_IF_ERROR(ResumeAll());
   // The take grows for a while, then it is closed.
   if (!closed_ && (calm_ || Chance(0.1))) {
     frames_known_ = std::min(frames_.size(), frames_known_ + 1 + random_.Below(3));
@@ -397,7 +257,7 @@ absl::Status SimulatedFarm::Run() {
   RETURN_IF_ERROR(Happen(core::Restored{}));
   for (std::size_t i = 0; i < memory_.jobs.size(); ++i) {
     const SimulatedStore::SubmittedJob job = memory_.jobs[i];
-    RETURN_IF_ERROR(Happen(core::JobSubmitted{.id = job.id, .name = "take", .user = job.user, .priority = job.priority}));
+    RETURN_IF_ERROR(Happen(Submission(job)));
   }
   while (!IsOver()) {
     RETURN_IF_ERROR(Tick());

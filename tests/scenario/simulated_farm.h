@@ -32,7 +32,10 @@ struct Weather {
   double commit_unknown = 0;   // a commit: it is written, but the scheduler is told that it timed out
   double leader_replaced = 0;  // a tick: another scheduler leads, while this one was stopped and does not know
   double file_lost = 0;        // a restart of the scheduler, per result
-  double user_acts = 0;        // a tick: cancels, retries, submits again
+  double user_acts = 0;        // a tick: cancels, retries under other limits, pauses, resumes, submits again
+  double attempt_drags = 0;    // it takes up to two minutes longer
+  double worker_sickens = 0;   // a tick: for up to a minute it fails all that it gets, at once
+  double clock_jumps = 0;      // a tick: up to ten minutes ahead
 };
 
 class SimulatedFarm {
@@ -45,6 +48,9 @@ class SimulatedFarm {
   std::int64_t steps() const { return steps_; }
   /// Writes of replaced leaders, all of them refused.
   std::int64_t refused() const { return refused_; }
+  /// Second attempts, and steps with a worker set aside.
+  std::int64_t copied() const { return copied_; }
+  std::int64_t set_aside() const { return set_aside_; }
 
  private:
   struct Attempt {
@@ -59,6 +65,7 @@ class SimulatedFarm {
     std::int32_t slots = 1;
     core::ConnectionId connection = 0;  // 0: not connected
     bool welcomed = false;
+    absl::Time sick_until = absl::InfinitePast();
     absl::Time silent_until = absl::InfinitePast();
     absl::Time connects_at;
     absl::Time beats_at;
@@ -113,7 +120,9 @@ class SimulatedFarm {
   void StartAttempt(SimulatedWorker& worker, const core::Lease& lease);
   core::Finished Outcome(const SimulatedWorker& worker, const Attempt& attempt);
   void Post(core::ConnectionId connection, core::Event event);
+  static core::JobSubmitted Submission(const SimulatedStore::SubmittedJob& job);
   absl::Status ActAsUser();
+  absl::Status ResumeAll();
   bool IsOver() const;
   absl::Status CheckEnd() const;
   absl::Status Wrong(const std::string& what) const;
@@ -136,6 +145,8 @@ class SimulatedFarm {
   std::optional<Replaced> replaced_;
   std::set<core::ConnectionId> to_replaced_;  // streams that end there, or ended there before it was gone
   std::int64_t refused_ = 0;
+  std::int64_t copied_ = 0;
+  std::int64_t set_aside_ = 0;
   std::set<base::Digest> files_;                   // results in the artifact folder
   std::map<base::Digest, std::int32_t> accepted_;  // how often a result was taken for a key since its file was last lost
   core::ConnectionId last_connection_ = 0;

@@ -2,14 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <map>
-#include <optional>
-
-#include <fmt/format.h>
-
-#include "scheduler/core/check.h"
-#include "scheduler/core/job_view.h"
-#include "scheduler/core/step.h"
+#include "core_bench.h"
 
 namespace vorocast::core {
 namespace {
@@ -17,81 +10,8 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-/// Drives the core by hand: look-ups are answered at once with what has been made so far, what it sends is kept.
-class Bench {
- public:
-  Bench() { Happen(Restored{}); }
-
-  void Happen(Event event) {
-    Effects effects = Step(state, std::move(event), now);
-    const absl::Status status = Check(state);
-    EXPECT_TRUE(status.ok()) << status;
-    for (Message& message : effects.messages) messages.push_back(std::move(message));
-    for (Record& record : effects.records) {
-      if (const auto* made = std::get_if<ResultMade>(&record)) results[made->key] = made->result;
-      records.push_back(std::move(record));
-    }
-    for (const LookUp& look_up : effects.look_ups) {
-      looked_up.push_back(look_up.key);
-      if (look_up.verify) ++verified;
-      const auto found = results.find(look_up.key);
-      if (answer) Happen(LookUpAnswered{look_up.key, found == results.end() ? std::nullopt : std::optional(found->second), true});
-    }
-  }
-  void Pass(absl::Duration time) {
-    for (absl::Duration passed; passed < time; passed += absl::Milliseconds(100)) {
-      now += absl::Milliseconds(100);
-      Happen(Tick{});
-    }
-  }
-  void Job(const std::string& id, std::int32_t frames, const std::string& user = "anna", std::int32_t priority = 0, std::int32_t first = 0) {
-    Happen(JobSubmitted{.id = id, .name = "take", .user = user, .priority = priority});
-    plan::JobSpec spec;
-    std::vector<plan::PlannedFrame> take;
-    for (std::int32_t i = first; i < first + frames; ++i) {
-      take.push_back({.number = i, .blob = base::HashBytes(fmt::format("{}", i)), .extension = ".ply"});
-    }
-    Happen(TasksAdded{.job = id, .tasks = *plan::Plan(spec, take, true), .complete = true, .bad_frames_max = 1});
-  }
-  void Connect(ConnectionId connection, const std::string& name, std::int32_t slots = 1, std::vector<AttemptId> holding = {}) {
-    Happen(WorkerConnected{connection, name, {std::begin(tasks::kAllKinds), std::end(tasks::kAllKinds)}, slots, std::move(holding)});
-  }
-  /// Leases sent since the last call.
-  std::vector<Lease> TakeLeases(ConnectionId connection) {
-    std::vector<Lease> leases;
-    std::erase_if(messages, [&](const Message& message) {
-      const auto* sent = std::get_if<Leases>(&message.content);
-      if (!sent || message.connection != connection) return false;
-      leases.insert(leases.end(), sent->leases.begin(), sent->leases.end());
-      return true;
-    });
-    return leases;
-  }
-  std::vector<std::string> TakeLabels(ConnectionId connection) {
-    std::vector<std::string> labels;
-    for (const Lease& lease : TakeLeases(connection)) labels.push_back(lease.label);
-    return labels;
-  }
-  void Succeed(ConnectionId connection, const AttemptId& id) { Happen(Finished{connection, id, Succeeded{{.size = 1, .seconds = 2}}}); }
-  void Fail(ConnectionId connection, const AttemptId& id, Cause cause) { Happen(Finished{connection, id, AttemptFailed{cause, "broken"}}); }
-  std::string Explained(const std::string& job, const std::string& task) { return *Explain(state, *FindJob(state, job), task); }
-  template <typename R>
-  std::int64_t Count() const {
-    return std::count_if(records.begin(), records.end(), [](const Record& record) { return std::holds_alternative<R>(record); });
-  }
-
-  State state;
-  absl::Time now = absl::UnixEpoch();
-  bool answer = true;
-  std::vector<Message> messages;
-  std::vector<Record> records;
-  std::vector<base::Digest> looked_up;
-  int verified = 0;
-  std::map<base::Digest, Result> results;
-};
-
 TEST(Core, FlowsInTheOrderOfThePlan) {
-  Bench bench;
+  CoreBench bench;
   bench.Job("j1", 2);
   bench.Connect(1, "w");
   std::vector<std::string> order;
@@ -106,7 +26,7 @@ TEST(Core, FlowsInTheOrderOfThePlan) {
 }
 
 TEST(Core, TasksWithOneKeyRunOnceForAllJobs) {
-  Bench bench;
+  CoreBench bench;
   bench.Job("j1", 2);
   bench.Job("j2", 2, "bert");
   bench.Connect(1, "w", 10);
@@ -119,7 +39,7 @@ TEST(Core, TasksWithOneKeyRunOnceForAllJobs) {
 }
 
 TEST(Core, CancellingOneJobKeepsWhatAnotherWants) {
-  Bench bench;
+  CoreBench bench;
   bench.Job("j1", 2);
   bench.Job("j2", 2);
   bench.Connect(1, "w", 10);
@@ -133,7 +53,7 @@ TEST(Core, CancellingOneJobKeepsWhatAnotherWants) {
 }
 
 TEST(Core, LargerPriorityThenFewestLeasesThenOldestJob) {
-  Bench bench;
+  CoreBench bench;
   bench.Job("j1", 3, "anna", 0, 0);
   bench.Job("j2", 3, "bert", 0, 10);
   bench.Job("j3", 1, "cora", 5, 20);
@@ -143,7 +63,7 @@ TEST(Core, LargerPriorityThenFewestLeasesThenOldestJob) {
 }
 
 TEST(Core, AStaleReportIsAcknowledgedAndIgnored) {
-  Bench bench;
+  CoreBench bench;
   bench.Job("j1", 1);
   bench.Connect(1, "w1");
   const AttemptId first = bench.TakeLeases(1)[0].id;
@@ -162,7 +82,7 @@ TEST(Core, AStaleReportIsAcknowledgedAndIgnored) {
 }
 
 TEST(Core, AWorkerThatComesBackInTimeGoesOn) {
-  Bench bench;
+  CoreBench bench;
   bench.Job("j1", 1);
   bench.Connect(1, "w");
   const AttemptId id = bench.TakeLeases(1)[0].id;
@@ -178,7 +98,7 @@ TEST(Core, AWorkerThatComesBackInTimeGoesOn) {
 }
 
 TEST(Core, AHangingWorkerLosesItsLeaseAfterTenSecondsAndGetsNoOther) {
-  Bench bench;
+  CoreBench bench;
   bench.Job("j1", 1);
   bench.Connect(1, "w");
   const AttemptId id = bench.TakeLeases(1)[0].id;
@@ -197,7 +117,7 @@ TEST(Core, CausesDecideAboutTheNextAttempt) {
   const std::vector<std::pair<Cause, int>> attempts = {{Cause::kInput, 1},    {Cause::kCrashed, 3},     {Cause::kTimedOut, 2},
                                                        {Cause::kInternal, 3}, {Cause::kOutOfMemory, 2}, {Cause::kDrained, 11}};
   for (const auto& [cause, expected] : attempts) {
-    Bench bench;
+    CoreBench bench;
     bench.Job("j1", 1);
     bench.Connect(1, "w");
     int made = 0;
@@ -227,7 +147,7 @@ TEST(Core, CausesDecideAboutTheNextAttempt) {
 }
 
 TEST(Core, AnUnreachableStoreIsGivenTime) {
-  Bench bench;
+  CoreBench bench;
   bench.Job("j1", 1);
   bench.Connect(1, "w");
   bench.Fail(1, bench.TakeLeases(1)[0].id, Cause::kStore);
@@ -236,7 +156,7 @@ TEST(Core, AnUnreachableStoreIsGivenTime) {
 }
 
 TEST(Core, ABadFrameBecomesAMissingInput) {
-  Bench bench;
+  CoreBench bench;
   bench.Job("j1", 3);
   bench.Connect(1, "w");
   bool guide_saw_gap = false;
@@ -254,7 +174,7 @@ TEST(Core, ABadFrameBecomesAMissingInput) {
 }
 
 TEST(Core, WhatNeedsAFailedTaskFailsWithIt) {
-  Bench bench;
+  CoreBench bench;
   bench.Job("j1", 2);
   bench.Connect(1, "w");
   for (auto leases = bench.TakeLeases(1); !leases.empty(); leases = bench.TakeLeases(1)) {
@@ -268,7 +188,7 @@ TEST(Core, WhatNeedsAFailedTaskFailsWithIt) {
 }
 
 TEST(Core, ARetryOfAJobThatIsOverMakesLostResultsAgain) {
-  Bench bench;
+  CoreBench bench;
   bench.Job("j1", 2);
   bench.Connect(1, "w");
   for (auto leases = bench.TakeLeases(1); !leases.empty(); leases = bench.TakeLeases(1)) bench.Succeed(1, leases[0].id);
@@ -283,7 +203,7 @@ TEST(Core, ARetryOfAJobThatIsOverMakesLostResultsAgain) {
 }
 
 TEST(Core, AForgottenJobLeavesNothingBehindAndItsResultsAreReused) {
-  Bench bench;
+  CoreBench bench;
   bench.Job("j1", 2);
   bench.Happen(JobForgotten{"j1"});
   EXPECT_TRUE(FindJob(bench.state, "j1")) << "it is not over";
@@ -298,7 +218,7 @@ TEST(Core, AForgottenJobLeavesNothingBehindAndItsResultsAreReused) {
 }
 
 TEST(Core, AStoppedSchedulerDoesNotBlameItsWorkers) {
-  Bench bench;
+  CoreBench bench;
   bench.Job("j1", 1);
   bench.Connect(1, "w");
   const AttemptId id = bench.TakeLeases(1)[0].id;
@@ -310,7 +230,7 @@ TEST(Core, AStoppedSchedulerDoesNotBlameItsWorkers) {
 }
 
 TEST(Core, SaysWhyATaskWaits) {
-  Bench bench;
+  CoreBench bench;
   bench.Job("j1", 2);
   EXPECT_THAT(bench.Explained("j1", "frame 0: tessellate"), HasSubstr("none is connected"));
   EXPECT_THAT(bench.Explained("j1", "j1/guide"), HasSubstr("waits for 3 tasks"));

@@ -256,6 +256,29 @@ TEST_F(SchedulerServerTest, AJobSaysOnWhatTermsItRunsAndWhenItCameAndEnded) {
   EXPECT_EQ((Call<v1::Jobs::StubInterface>(*jobs_, &v1::Jobs::StubInterface::List, request)->jobs_size()), 0);
 }
 
+TEST_F(SchedulerServerTest, APauseOutlastsTheSchedulerAndEndsWithAResume) {
+  StartWorker();
+  const auto sequence = Open();
+  const auto job = Submit(sequence->id());
+  v1::JobRequest request;
+  request.set_job_id(job->id());
+  EXPECT_TRUE((Call<v1::Jobs::StubInterface>(*jobs_, &v1::Jobs::StubInterface::Pause, request)->paused()));
+  ASSERT_TRUE(AddFrames(sequence->id(), 0, 4).ok());
+  ASSERT_TRUE(Close(sequence->id()).ok());
+  server_.reset();
+  StartScheduler();
+  EXPECT_TRUE(Await([&] { return Get(job->id())->stages_size() > 0 && Get(job->id())->sequence_closed(); }));
+  EXPECT_TRUE(Get(job->id())->paused());
+  EXPECT_THAT(Explain(job->id(), ""), HasSubstr("paused"));
+  EXPECT_TRUE(worker_->executed().empty());
+  EXPECT_FALSE((Call<v1::Jobs::StubInterface>(*jobs_, &v1::Jobs::StubInterface::Resume, request)->paused()));
+  EXPECT_EQ(WatchToEnd(job->id())->state(), v1::DONE);
+  EXPECT_EQ((Call<v1::Jobs::StubInterface>(*jobs_, &v1::Jobs::StubInterface::Pause, request).status().code()), absl::StatusCode::kFailedPrecondition);
+  const auto fleet = Call<v1::Jobs::StubInterface>(*jobs_, &v1::Jobs::StubInterface::List, v1::ListJobsRequest())->fleet();
+  EXPECT_EQ(fleet.workers(), 1);
+  EXPECT_EQ(fleet.slots(), 4);
+}
+
 TEST_F(SchedulerServerTest, ABadFrameCostsThatFrame) {
   StartWorker({.fails = [](const std::string& label) { return label == "frame 2: tessellate" ? "3 normals are not finite" : ""; }});
   const auto sequence = Open();
