@@ -13,7 +13,7 @@ namespace vorocast::core {
 namespace {
 
 /// More tasks than this are played through in bundles.
-constexpr double kPlayedMax = 3000;
+constexpr double kPlayedMax = 1000;
 
 std::int32_t Of(const KindCounts& counts, Phase phase) { return counts.phase[static_cast<std::size_t>(phase)]; }
 std::int32_t Open(const Job& job, bool with_blocked) {
