@@ -74,7 +74,7 @@ export SLURM_CONF=$folder/slurm.conf
 nodes=$(grep -c '^NodeName=' slurm.conf)
 
 # runs FILE PROGRAM: whether the process whose number is in FILE is that program.
-runs() { [ -s "$1" ] && [ "$(cat "/proc/$(cat "$1")/comm" 2>/dev/null)" = "$2" ]; }
+runs() { [ -s "$1" ] && [ "$(cat "/proc/$(cat "$1")/comm" 2>/dev/null)" = "$2" ] && ! grep -q '^State:.*Z' "/proc/$(cat "$1")/status"; }
 
 if ! runs munge/pid munged; then
   rm -f munge/socket munge/socket.lock
@@ -88,7 +88,7 @@ for i in $(seq 1 "$nodes"); do
 done
 
 deadline=$((SECONDS + 60))
-until [ "$(sinfo --noheader --Node --partition=farm --states=idle,mixed,allocated --format=%N 2>/dev/null | sort -u | wc -l)" -eq "$nodes" ]; do
+until [ "$(sinfo --noheader --Node --partition=farm --states=idle,mixed,allocated,completing --format=%N 2>/dev/null | sort -u | wc -l)" -eq "$nodes" ]; do
   if [ $SECONDS -ge $deadline ]; then
     echo "up.sh: not all nodes came up within a minute; see $folder/log" >&2
     exit 1

@@ -5,15 +5,19 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 
+#include <chrono>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <memory>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "services/base/random.h"
 #include "tests/cluster/programs.h"
 #include "tests/support/slurm_cluster.h"
 
@@ -49,42 +53,98 @@ pid_t BusyWorker(const std::filesystem::path& state) {
   return -1;
 }
 
-TEST(Slurm, AJobOutlivesAWorkerAndANodesDaemonAndTheArrayEndsWithTheWork) {
-  const auto cluster = support::SlurmCluster::Start(2, 1);
-  if (!cluster) GTEST_SKIP() << "Slurm is not installed: deploy/install_packages.sh";
-  const std::filesystem::path folder = Scratch() / "slurm";
-  const std::string capture = (folder / "capture").string();
-  const std::filesystem::path state = folder / "state";
-  ASSERT_EQ(RunProgram({"synth", capture, "--count", "8", "--points", "8000"}).exit_code, 0);
-  const Outcome undisturbed =
-      RunProgram(JobFlags({"run", capture, "--out", (folder / "undisturbed").string(), "--state", (folder / "local").string(), "--workers", "1"}));
-  ASSERT_EQ(undisturbed.exit_code, 0) << undisturbed.output;
+/// A Slurm of two nodes, a scheduler that takes its workers from there, and what a job gives that runs undisturbed on one machine.
+class Slurm : public testing::Test {
+ protected:
+  void SetUp() override {
+    cluster_ = support::SlurmCluster::Start(2, 1);
+    if (!cluster_) GTEST_SKIP() << "Slurm is not installed: deploy/install_packages.sh";
+    folder_ = Scratch() / testing::UnitTest::GetInstance()->current_test_info()->name();
+    state_ = folder_ / "state";
+    scheduler_ = std::make_unique<Running>(
+        std::vector<std::string>{"--state", state_.string(), "--listen", "127.0.0.1:0", "--fleet", "slurm", "--slurm-partition", "farm",
+                                 "--workers-max", "2", "--finish-in", "1", "--slurm-poll", "0.2", "--idle", "1", "--drain-time", "3"},
+        "vorocast-scheduler");
+    ASSERT_TRUE(Eventually([&] { return !AddressOf(state_).empty(); }, 30));
+    ASSERT_FALSE(Undisturbed().empty());
+  }
 
-  Running scheduler({"--state", state.string(), "--listen", "127.0.0.1:0", "--fleet", "slurm", "--slurm-partition", "farm", "--workers-max", "2",
-                     "--finish-in", "1", "--slurm-poll", "0.2", "--idle", "1", "--drain-time", "3"},
-                    "vorocast-scheduler");
-  ASSERT_TRUE(Eventually([&] { return !AddressOf(state).empty(); }, 30));
-  const std::string address = AddressOf(state);
-  EXPECT_EQ(cluster->Count("RUNNING"), 0) << "workers without work";
+  static const std::string& Capture() {
+    static const std::string capture = [] {
+      const std::string made = (Scratch() / "capture").string();
+      EXPECT_EQ(RunProgram({"synth", made, "--count", "8", "--points", "8000"}).exit_code, 0);
+      return made;
+    }();
+    return capture;
+  }
+  static const std::map<std::string, std::string>& Undisturbed() {
+    static const std::map<std::string, std::string> digests = [] {
+      const std::filesystem::path folder = Scratch() / "undisturbed";
+      const Outcome outcome =
+          RunProgram(JobFlags({"run", Capture(), "--out", (folder / "out").string(), "--state", (folder / "state").string(), "--workers", "1"}));
+      EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+      return Digests(folder / "out");
+    }();
+    return digests;
+  }
 
-  Running job(JobFlags({"submit", capture, "--to", address, "--watch"}));
+  std::string Address() const { return AddressOf(state_); }
+  void ExpectUndisturbedResults(Running& job) {
+    const Outcome outcome = job.Wait();
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+    const Outcome fetched = RunProgram({"fetch", "--to", Address(), "--out", (folder_ / "out").string()});
+    EXPECT_EQ(fetched.exit_code, 0) << fetched.output;
+    EXPECT_EQ(Digests(folder_ / "out"), Undisturbed());
+  }
+  /// With the cluster in order again, nobody stays without work, and the scheduler ends when it is told to.
+  void ExpectGoodOrder() {
+    cluster_->Repair();
+    EXPECT_TRUE(Eventually([&] { return cluster_->Count("RUNNING,PENDING") == 0; }, 90)) << "workers without work";
+    scheduler_->Signal(SIGTERM);
+    EXPECT_EQ(scheduler_->Wait().exit_code, 0);
+  }
+
+  std::unique_ptr<support::SlurmCluster> cluster_;
+  std::filesystem::path folder_, state_;
+  std::unique_ptr<Running> scheduler_;
+};
+
+TEST_F(Slurm, AJobOutlivesAWorkerAndANodesDaemonAndTheArrayEndsWithTheWork) {
+  EXPECT_EQ(cluster_->Count("RUNNING"), 0) << "workers without work";
+  Running job(JobFlags({"submit", Capture(), "--to", Address(), "--watch"}));
   pid_t worker = -1;
-  ASSERT_TRUE(Eventually([&] { return CountFiles(state / "artifacts") >= 2 && (worker = BusyWorker(state)) > 0; }, 60));
+  ASSERT_TRUE(Eventually([&] { return CountFiles(state_ / "artifacts") >= 2 && (worker = BusyWorker(state_)) > 0; }, 60));
   kill(worker, SIGKILL);
-  cluster->KillNode(1);
-  const Outcome outcome = job.Wait();
-  EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
-  const Outcome fetched = RunProgram({"fetch", "--to", address, "--out", (folder / "out").string()});
-  EXPECT_EQ(fetched.exit_code, 0) << fetched.output;
+  cluster_->KillNode(1);
+  ExpectUndisturbedResults(job);
+  ExpectGoodOrder();
+}
 
-  auto expected = Digests(folder / "undisturbed");
-  EXPECT_FALSE(expected.empty());
-  EXPECT_EQ(Digests(folder / "out"), expected);
-
-  cluster->Repair();
-  EXPECT_TRUE(Eventually([&] { return cluster->Count("RUNNING,PENDING") == 0; }, 60)) << "workers without work";
-  scheduler.Signal(SIGTERM);
-  EXPECT_EQ(scheduler.Wait().exit_code, 0);
+TEST_F(Slurm, AJobOutlivesWhateverIsKilledAtRandomMoments) {
+  // The controller is away already when the work arrives: the scheduler must go on asking.
+  cluster_->KillController();
+  Running job(JobFlags({"submit", Capture(), "--to", Address(), "--watch"}));
+  base::Random random(5);
+  std::string story;
+  for (int fault = 0; fault < 6 && !job.HasEnded(); ++fault) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(random.Below(1500)));
+    const std::size_t victim = random.Below(4);
+    if (victim < 2) {
+      cluster_->KillNode(static_cast<int>(victim) + 1);
+      story += fmt::format("slurmd of node {} killed\n", victim + 1);
+    } else if (victim == 2) {
+      cluster_->KillController();
+      story += "slurmctld killed\n";
+    } else if (const pid_t worker = BusyWorker(state_); worker > 0) {
+      kill(worker, SIGKILL);
+      story += "worker killed\n";
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(random.Below(1000)));
+    cluster_->Repair();
+  }
+  SCOPED_TRACE(story);
+  ExpectUndisturbedResults(job);
+  ExpectGoodOrder();
 }
 
 }  // namespace

@@ -29,6 +29,14 @@ int Shell(const std::string& line) {
   return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
 }
 
+bool IsZombie(pid_t pid) {
+  std::ifstream file(fmt::format("/proc/{}/stat", pid));
+  std::string stat;
+  std::getline(file, stat);
+  const std::size_t name_end = stat.rfind(')');
+  return name_end == std::string::npos || stat.compare(name_end, 3, ") Z") == 0;
+}
+
 /// Away from the usual place and, as tests of several builds may run at once, from each other.
 int FirstPort() { return 20000 + static_cast<int>(getpid() % 1000) * 10; }
 
@@ -63,11 +71,16 @@ int SlurmCluster::Count(const std::string& state) const {
   return lines;
 }
 
-void SlurmCluster::KillNode(int node) const {
-  std::ifstream file(folder_ / fmt::format("slurmd-node{}.pid", node));
+void SlurmCluster::KillNode(int node) const { Kill(fmt::format("slurmd-node{}.pid", node)); }
+
+void SlurmCluster::KillController() const { Kill("slurmctld.pid"); }
+
+void SlurmCluster::Kill(const std::string& pid_file) const {
+  std::ifstream file(folder_ / pid_file);
   pid_t pid = -1;
   VOROCAST_CHECK(file >> pid && pid > 1);
-  kill(pid, SIGKILL);
+  // Gone, or a zombie that nobody waits for: up.sh must not take it for running.
+  while (kill(pid, SIGKILL) == 0 && !IsZombie(pid)) usleep(10'000);
 }
 
 void SlurmCluster::Repair() const {

@@ -24,10 +24,13 @@ class SlurmCluster {
   int Count(const std::string& state) const;
   /// kill -9 of a node's daemon; its jobs' processes stay for a while.
   void KillNode(int node) const;
+  /// kill -9 of the cluster's controller: nothing can be asked or submitted until Repair.
+  void KillController() const;
   /// Starts what does not run.
   void Repair() const;
 
  private:
+  void Kill(const std::string& pid_file) const;
   explicit SlurmCluster(std::filesystem::path folder) : folder_(std::move(folder)) {}
   std::filesystem::path folder_;
 };
