@@ -94,7 +94,6 @@ TEST(Tree, LibrariesStayInTheFoldersThatOwnThem) {
       {std::regex("^png\\.h"), {"services/rendering"}},
       {std::regex("^sqlite3"), {"scheduler/store"}},
       {std::regex("^openssl/"), {"services/base", "services/rpc"}},  // digests; certificates and tokens
-      {std::regex("^prometheus/"), {"services/telemetry"}},
   };
   std::vector<std::string> breaches;
   for (const SourceFile& file : SourceFiles()) {
