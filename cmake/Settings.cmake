@@ -36,3 +36,13 @@ option(VOROCAST_WERROR "Treat warnings as errors" ON)
 if(VOROCAST_WERROR)
   target_compile_options(vorocast_warnings INTERFACE -Werror)
 endif()
+
+# The fuzzers (tests/fuzz) see inside every folder. Without this option they are built with a driver of their own, by any compiler.
+option(VOROCAST_FUZZ "Build the fuzzers for libFuzzer, everything instrumented (clang only)" OFF)
+if(VOROCAST_FUZZ)
+  if(NOT CMAKE_CXX_COMPILER_ID MATCHES "Clang")
+    message(FATAL_ERROR "VOROCAST_FUZZ needs clang: configure with -DCMAKE_CXX_COMPILER=clang++")
+  endif()
+  add_compile_options(-fsanitize=fuzzer-no-link,address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer -g)
+  add_link_options(-fsanitize=address,undefined)
+endif()

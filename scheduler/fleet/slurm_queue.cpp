@@ -26,7 +26,9 @@ const json* Field(const json& object, const char* name) {
 std::optional<std::int64_t> Number(const json* value) {
   if (!value) return std::nullopt;
   if (value->is_number_integer()) return value->get<std::int64_t>();
-  if (!value->is_object() || value->value("set", json(false)) != json(true)) return std::nullopt;
+  if (!value->is_object()) return std::nullopt;
+  const json* set = Field(*value, "set");
+  if (!set || !set->is_boolean() || !set->get<bool>()) return std::nullopt;
   const json* number = Field(*value, "number");
   return number && number->is_number_integer() ? std::optional(number->get<std::int64_t>()) : std::nullopt;
 }
@@ -64,7 +66,7 @@ void ReadJob(const json& job, std::string_view job_name, std::vector<SlurmMember
   const std::string listed = Text(Field(job, "array_task_string"));
   if (!listed.empty()) {
     for (const std::int64_t task : ParseTaskRanges(listed, kTasksMax)) members.push_back({*array, task, *state});
-  } else if (const auto task = Number(Field(job, "array_task_id"))) {
+  } else if (const auto task = Number(Field(job, "array_task_id")); task && *task >= 0) {
     members.push_back({*array, *task, *state});
   }
 }

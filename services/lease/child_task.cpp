@@ -13,6 +13,13 @@ std::string Line(const json& value) { return value.dump(-1, ' ', false, json::er
 
 std::string ValidUtf8(std::string_view text) { return json::parse(Line(json(std::string(text)))).get<std::string>(); }
 
+/// The field, or null. A reference: copying a value recurses as deep as what was printed nests.
+const json& Field(const json& object, const char* name) {
+  static const json kNone;
+  const auto field = object.find(name);
+  return field == object.end() ? kNone : *field;
+}
+
 bool IsContinuation(char byte) { return (static_cast<unsigned char>(byte) & 0xC0) == 0x80; }
 
 }  // namespace
@@ -27,9 +34,8 @@ std::string Encode(const ChildTask& task) {
 
 absl::StatusOr<ChildTask> DecodeChildTask(std::string_view text) {
   const json value = json::parse(text, nullptr, false);
-  const bool right = value.is_object() && value.contains("spec") && value.value("store_root", json()).is_string() &&
-                     value.value("output", json()).is_string() && value.value("memory_limit", json()).is_number_integer() &&
-                     value.value("worker_pid", json()).is_number_integer();
+  const bool right = value.is_object() && value.contains("spec") && Field(value, "store_root").is_string() && Field(value, "output").is_string() &&
+                     Field(value, "memory_limit").is_number_integer() && Field(value, "worker_pid").is_number_integer();
   if (!right) return absl::InternalError("standard input does not hold a task; this command is for workers, which write one there");
   ChildTask task;
   ASSIGN_OR_RETURN(task.spec, tasks::TaskSpecFromJson(value["spec"]));
@@ -51,9 +57,9 @@ ChildLine DecodeChildLine(std::string_view line) {
   ChildLine decoded;
   const json value = json::parse(line, nullptr, false);
   if (!value.is_object()) return decoded;
-  if (const json progress = value.value("progress", json()); progress.is_number()) decoded.progress = progress.get<double>();
-  const json code = value.value("code", json());
-  const json message = value.value("message", json());
+  if (const json& progress = Field(value, "progress"); progress.is_number()) decoded.progress = progress.get<double>();
+  const json& code = Field(value, "code");
+  const json& message = Field(value, "message");
   if (code.is_number_integer() && message.is_string()) {
     decoded.outcome = absl::Status(static_cast<absl::StatusCode>(code.get<int>()), message.get<std::string>());
   }

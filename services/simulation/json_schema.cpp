@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "services/base/check.h"
+#include "services/tasks/field_table.h"
 
 namespace vorocast::simulation {
 namespace {
@@ -16,9 +17,11 @@ using nlohmann::json;
 
 std::string Join(const std::vector<std::string>& words) { return fmt::format("{}", fmt::join(words, ", ")); }
 
-/// A value as a message shows it: short, and never invalid UTF-8.
+/// A value as a message shows it: short, and never invalid UTF-8. Writing it out recurses as deep as it nests, which a client decides.
 std::string Show(const json& value) {
   constexpr std::size_t kLongest = 60;
+  constexpr int kDeepest = 32;
+  if (!tasks::NestsWithin(value, kDeepest)) return fmt::format("what nests more than {} deep", kDeepest);
   std::string text = value.dump(-1, ' ', true, json::error_handler_t::replace);
   if (text.size() > kLongest) text = text.substr(0, kLongest) + "…";
   return text;
