@@ -21,6 +21,7 @@ using Transform = Eigen::Affine3d;
 constexpr std::size_t kMost = 20000;                  // triangles, and corners
 constexpr std::uintmax_t kLargestFile = 64ULL << 20;  // bytes
 constexpr int kDeepest = 64;                          // nodes within nodes
+constexpr int kNodesMost = 100'000;                   // each as often as it is shown: a few lines of text can show one 2^64 times
 constexpr double kGrain = 1e-5;                       // corners are rounded to this: an effect is text
 
 absl::Status Wrong(const std::filesystem::path& path, std::string_view what) {
@@ -44,7 +45,8 @@ class GltfScene {
  public:
   explicit GltfScene(const tinygltf::Model& model) : model_(model) {}
 
-  absl::Status AddNode(int index, const Transform& world_from_parent, int depth, TriangleMesh& mesh) const {
+  absl::Status AddNode(int index, const Transform& world_from_parent, int depth, TriangleMesh& mesh) {
+    if (++nodes_ > kNodesMost) return absl::InvalidArgumentError(fmt::format("it shows more than {} nodes", kNodesMost));
     if (index < 0 || static_cast<std::size_t>(index) >= model_.nodes.size()) return absl::InvalidArgumentError("a node that is not there");
     if (depth > kDeepest) return absl::InvalidArgumentError("its nodes are nested too deeply");
     const tinygltf::Node& node = model_.nodes[static_cast<std::size_t>(index)];
@@ -105,10 +107,14 @@ class GltfScene {
       std::memcpy(x.data(), corners.first + i * corners.stride, sizeof(float) * 3);
       mesh.vertices.emplace_back(world_from_node * x.cast<double>());
     }
+    if (mesh.triangles.size() > kMost) return absl::InvalidArgumentError(fmt::format("more than {} triangles", kMost));
     std::vector<std::int32_t> loop;
     if (primitive.indices >= 0) {
       ASSIGN_OR_RETURN(const Elements indices, ElementsOf(primitive.indices, TINYGLTF_TYPE_SCALAR));
-      if (indices.count > 3 * kMost) return absl::InvalidArgumentError(fmt::format("more than {} triangles", kMost));
+      if (indices.component_type != TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE && indices.component_type != TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT &&
+          indices.component_type != TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT)
+        return absl::InvalidArgumentError("triangles whose corners are no whole numbers");
+      if (indices.count > 3 * (kMost - mesh.triangles.size())) return absl::InvalidArgumentError(fmt::format("more than {} triangles", kMost));
       for (std::size_t i = 0; i < indices.count; ++i) {
         const std::size_t index = Index(indices, i);
         if (index >= corners.count) return absl::InvalidArgumentError("a triangle with a corner that is not there");
@@ -125,6 +131,7 @@ class GltfScene {
   }
 
   const tinygltf::Model& model_;
+  int nodes_ = 0;  // shown so far
 };
 
 absl::StatusOr<TriangleMesh> ReadGltf(const std::filesystem::path& path) {
@@ -135,10 +142,15 @@ absl::StatusOr<TriangleMesh> ReadGltf(const std::filesystem::path& path) {
   // Pictures are nothing to collide with; they are not even looked at.
   loader.SetImageLoader([](tinygltf::Image*, int, std::string*, std::string*, int, int, const unsigned char*, int, void*) { return true; }, nullptr);
   const bool binary = path.extension() == ".glb" || path.extension() == ".GLB";
-  const bool loaded =
-      binary ? loader.LoadBinaryFromFile(&model, &error, &warning, path.string()) : loader.LoadASCIIFromFile(&model, &error, &warning, path.string());
+  bool loaded = false;
+  try {
+    loaded = binary ? loader.LoadBinaryFromFile(&model, &error, &warning, path.string())
+                    : loader.LoadASCIIFromFile(&model, &error, &warning, path.string());
+  } catch (const std::exception& exception) {
+    return Wrong(path, fmt::format("not a glTF file: {}", exception.what()));
+  }
   if (!loaded) return Wrong(path, error.empty() ? "not a glTF file" : error);
-  const GltfScene scene(model);
+  GltfScene scene(model);
   TriangleMesh mesh;
   const int shown = model.defaultScene >= 0 ? model.defaultScene : 0;
   if (static_cast<std::size_t>(shown) >= model.scenes.size()) return Wrong(path, "it has no scene");

@@ -31,7 +31,15 @@ std::vector<std::string> MadeInputs() {
   const std::string binary = "glTF" + word(2) + word(12 + 8 + json.size() + 8 + buffer.size()) + word(json.size()) + "JSON" + json +
                              word(buffer.size()) + std::string("BIN\0", 4) + buffer;
   const std::string embedded = "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAABAAIAAAA=";
-  return {".glb\n" + binary, ".gltf\n" + document(R"(,"uri":"data:application/octet-stream;base64,)" + embedded + "\"")};
+  // Once bad: a buffer without bytes; indices of a type that is none; nodes that show one another 2^60 times.
+  std::string no_bytes = binary;
+  no_bytes.replace(no_bytes.find(R"("byteLength":44)"), 15, R"("byteLength": 0)");
+  std::string signed_indices = binary;
+  signed_indices.replace(signed_indices.find("5123"), 4, "5120");
+  std::string doubling = R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[)";
+  for (int i = 1; i <= 60; ++i) doubling += R"({"children":[)" + std::to_string(i) + "," + std::to_string(i) + "]},";
+  return {".glb\n" + no_bytes, ".glb\n" + signed_indices, ".gltf\n" + doubling + "{}]}", ".glb\n" + binary,
+          ".gltf\n" + document(R"(,"uri":"data:application/octet-stream;base64,)" + embedded + "\"")};
 }
 
 std::string MutateInput(const std::string& input, base::Random&) { return input; }
