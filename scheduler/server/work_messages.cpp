@@ -47,6 +47,14 @@ std::string WithoutZeros(std::string text) {
   return text;
 }
 
+/// At most `bytes_max` of it, and no character in part: clients could not read a message with such a text at all.
+std::string CutText(std::string text, std::size_t bytes_max) {
+  if (text.size() <= bytes_max) return text;
+  while (bytes_max > 0 && (static_cast<unsigned char>(text[bytes_max]) & 0xC0) == 0x80) --bytes_max;
+  text.resize(bytes_max);
+  return text;
+}
+
 double Measured(double value) { return std::isfinite(value) && value > 0 ? value : 0; }
 
 absl::StatusOr<core::Event> EventOf(core::ConnectionId connection, const v1::Hello& hello) {
@@ -94,7 +102,7 @@ absl::StatusOr<core::Event> EventOf(core::ConnectionId connection, const v1::Fin
   if (!finished.has_failed()) return absl::InvalidArgumentError("finished has no outcome");
   const v1::Failed& failed = finished.failed();
   ended.outcome = core::AttemptFailed{.cause = CauseOf(failed.cause()),
-                                      .message = WithoutZeros(failed.message().substr(0, kFailureMessageMax)),
+                                      .message = WithoutZeros(CutText(failed.message(), kFailureMessageMax)),
                                       .seconds = Measured(failed.seconds()),
                                       .cpu_seconds = Measured(failed.cpu_seconds()),
                                       .memory_peak = std::max<std::int64_t>(failed.memory_peak(), 0)};
