@@ -55,6 +55,11 @@ void FleetFlags::AddTo(CLI::App& program) {
   program.add_option("--slurm-option", extra_, "One more argument for sbatch, as in --slurm-option=--account=film; may be given again")
       ->allow_extra_args(false)
       ->group(kSlurm);
+  program
+      .add_option("--slurm-worker-option", worker_extra_,
+                  "One more argument for vorocast-worker, as in --slurm-worker-option=--token-file=/farm/worker.token; may be given again")
+      ->allow_extra_args(false)
+      ->group(kSlurm);
   slurm(program.add_option("--drain-time", drain_s_, "Seconds that tasks get to end when a worker is told to leave; less than Slurm's KillWait"))
       ->check(CLI::Range(0.0, 86400.0));
   slurm(program.add_option("--leave-after", leave_after_s_, "Seconds after which workers without a scheduler end"))->check(CLI::Range(1.0, 1e7));
@@ -70,19 +75,23 @@ absl::Status FleetFlags::Validate(const std::string& listen) const {
   for (const std::string& option : extra_) {
     if (!option.starts_with("-")) return absl::InvalidArgumentError("--slurm-option takes what sbatch takes: --slurm-option=--account=film");
   }
+  for (const std::string& option : worker_extra_) {
+    if (!option.starts_with("-"))
+      return absl::InvalidArgumentError("--slurm-worker-option takes what vorocast-worker takes: --slurm-worker-option=--tls-ca=/farm/ca.pem");
+  }
   return absl::OkStatus();
 }
 
-absl::StatusOr<std::vector<std::unique_ptr<Fleet>>> FleetFlags::Start(const std::filesystem::path& state, const std::string& address,
+absl::StatusOr<std::vector<std::unique_ptr<Fleet>>> FleetFlags::Start(const std::filesystem::path& state, const SchedulerAddresses& addresses,
                                                                       std::function<absl::StatusOr<Demand>()> demand) const {
   std::vector<std::unique_ptr<Fleet>> fleets;
   if (workers_ > 0 || simulation_) {
     FleetOptions options{.state = state,
-                         .members = Members({.programs = Programs(), .scheduler = address, .workers = workers_, .simulation = simulation_})};
+                         .members = Members({.programs = Programs(), .scheduler = addresses.here, .workers = workers_, .simulation = simulation_})};
     ASSIGN_OR_RETURN(fleets.emplace_back(), LocalFleet::Start(std::move(options)));
   }
   if (kind_ == "slurm") {
-    ASSIGN_OR_RETURN(fleets.emplace_back(), StartSlurm(state, address, std::move(demand)));
+    ASSIGN_OR_RETURN(fleets.emplace_back(), StartSlurm(state, addresses.elsewhere, std::move(demand)));
   }
   for (const auto& fleet : fleets) spdlog::info("fleet: {}", fleet->Describe());
   return fleets;
@@ -95,6 +104,7 @@ absl::StatusOr<std::unique_ptr<Fleet>> FleetFlags::StartSlurm(const std::filesys
                             .worker = worker_.empty() ? Programs() / "vorocast-worker" : std::filesystem::path(worker_),
                             .partition = partition_,
                             .extra = extra_,
+                            .worker_extra = worker_extra_,
                             .limits = limits_};
   options.limits.seconds_left_floor = std::min(options.limits.seconds_left_floor, finish_in_s_);
   options.finish_in = absl::Seconds(finish_in_s_);

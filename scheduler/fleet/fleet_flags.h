@@ -16,14 +16,19 @@
 
 namespace vorocast::fleet {
 
+/// Where a scheduler listens: for its own machine, which may have a door of its own, and for all others.
+struct SchedulerAddresses {
+  std::string here, elsewhere;
+};
+
 /// --workers, --simulation, --fleet, --slurm-… : which workers a scheduler keeps.
 class FleetFlags {
  public:
   void AddTo(CLI::App& program);
   /// INVALID_ARGUMENT when they do not go together; `listen` is the scheduler's --listen.
   absl::Status Validate(const std::string& listen) const;
-  /// The fleets asked for, perhaps none. `address` is where the scheduler listens.
-  absl::StatusOr<std::vector<std::unique_ptr<Fleet>>> Start(const std::filesystem::path& state, const std::string& address,
+  /// The fleets asked for, perhaps none.
+  absl::StatusOr<std::vector<std::unique_ptr<Fleet>>> Start(const std::filesystem::path& state, const SchedulerAddresses& addresses,
                                                             std::function<absl::StatusOr<Demand>()> demand) const;
 
  private:
@@ -38,6 +43,7 @@ class FleetFlags {
   std::string advertise_;
   std::string worker_;
   std::vector<std::string> extra_;
+  std::vector<std::string> worker_extra_;
   double finish_in_s_ = 600;
   double poll_s_ = 5;
   double leave_after_s_ = 600;

@@ -187,6 +187,7 @@ absl::Status SlurmFleet::Ask(std::int32_t workers) {
         std::string("--leave-after"), fmt::format("{:g}", absl::ToDoubleSeconds(options_.leave_after))}) {
     arguments.push_back(word);
   }
+  arguments.insert(arguments.end(), options_.worker_extra.begin(), options_.worker_extra.end());
   ASSIGN_OR_RETURN(const std::string printed, Run(arguments));
   ASSIGN_OR_RETURN(const std::int64_t job, ParseSubmitted(printed));
   spdlog::info("slurm fleet: asked for workers: count={} job={}", workers, job);

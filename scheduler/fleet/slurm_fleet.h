@@ -20,11 +20,12 @@
 namespace vorocast::fleet {
 
 struct SlurmFleetOptions {
-  std::filesystem::path state;     // shared by all machines: slurm/worker.sh, slurm/status.txt, logs/slurm-JOB_TASK.log
-  std::string scheduler;           // what workers connect to, HOST:PORT; several separated by commas
-  std::filesystem::path worker;    // vorocast-worker, as the nodes see it
-  std::string partition;           // empty: Slurm's default
-  std::vector<std::string> extra;  // further arguments of sbatch: "--account=film"
+  std::filesystem::path state;            // shared by all machines: slurm/worker.sh, slurm/status.txt, logs/slurm-JOB_TASK.log
+  std::string scheduler;                  // what workers connect to, HOST:PORT; several separated by commas
+  std::filesystem::path worker;           // vorocast-worker, as the nodes see it
+  std::string partition;                  // empty: Slurm's default
+  std::vector<std::string> extra;         // further arguments of sbatch: "--account=film"
+  std::vector<std::string> worker_extra;  // further arguments of vorocast-worker: "--tls-ca=/farm/ca.pem"
   SizingLimits limits;
   absl::Duration finish_in = absl::Minutes(10);  // when work that begins now should be done
   absl::Duration poll = absl::Seconds(5);

@@ -8,6 +8,7 @@
 
 #include "proto/dispatch.grpc.pb.h"
 #include "scheduler/server/engine.h"
+#include "services/rpc/gate.h"
 
 namespace vorocast::server {
 
@@ -16,8 +17,9 @@ class WorkStream;
 /// proto/dispatch.proto: one WorkStream a worker.
 class DispatchService final : public v1::Dispatch::CallbackService {
  public:
-  /// `engine` must outlive the service; `artifact_root` is what workers are told.
-  DispatchService(Engine& engine, std::string artifact_root) : engine_(engine), artifact_root_(std::move(artifact_root)) {}
+  /// `engine` and `gate` (or null) must outlive the service; `artifact_root` is what workers are told.
+  DispatchService(Engine& engine, std::string artifact_root, rpc::Gate* gate = nullptr)
+      : engine_(engine), artifact_root_(std::move(artifact_root)), gate_(gate) {}
 
   grpc::ServerBidiReactor<v1::WorkerMessage, v1::SchedulerMessage>* Work(grpc::CallbackServerContext* context) override;
 
@@ -32,6 +34,7 @@ class DispatchService final : public v1::Dispatch::CallbackService {
 
   Engine& engine_;
   const std::string artifact_root_;
+  rpc::Gate* const gate_;
   std::mutex mutex_;
   core::ConnectionId last_connection_ = 0;                             // guarded by mutex_
   std::map<core::ConnectionId, std::shared_ptr<WorkStream>> streams_;  // guarded by mutex_

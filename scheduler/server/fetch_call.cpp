@@ -19,20 +19,26 @@
 
 namespace vorocast::server {
 
-FetchCall::~FetchCall() {
+template <typename Chunk>
+FileCall<Chunk>::~FileCall() {
   if (file_ >= 0) close(file_);
 }
 
-void FetchCall::Refuse(const absl::Status& status) { Finish(rpc::ToGrpc(status)); }
+template <typename Chunk>
+void FileCall<Chunk>::Refuse(const absl::Status& status) {
+  this->Finish(rpc::ToGrpc(status));
+}
 
-void FetchCall::Send(const std::filesystem::path& path, const std::string& sha256) {
+template <typename Chunk>
+void FileCall<Chunk>::Send(const std::filesystem::path& path, const std::string& sha256) {
   disk_.Run([this, path, sha256] {
     if (const absl::Status status = Open(path, sha256); !status.ok()) return Refuse(status);
     WriteNext();
   });
 }
 
-absl::Status FetchCall::Open(const std::filesystem::path& path, const std::string& sha256) {
+template <typename Chunk>
+absl::Status FileCall<Chunk>::Open(const std::filesystem::path& path, const std::string& sha256) {
   storage::NoteUse(path, absl::Now());
   file_ = open(path.c_str(), O_RDONLY | O_CLOEXEC);
   struct stat info {};
@@ -47,8 +53,9 @@ absl::Status FetchCall::Open(const std::filesystem::path& path, const std::strin
   return absl::OkStatus();
 }
 
-void FetchCall::WriteNext() {
-  if (left_ == 0 && !first_) return Finish(grpc::Status::OK);
+template <typename Chunk>
+void FileCall<Chunk>::WriteNext() {
+  if (left_ == 0 && !first_) return this->Finish(grpc::Status::OK);
   std::string& bytes = *chunk_.mutable_data();
   bytes.resize(static_cast<std::size_t>(std::min(left_, rpc::kChunkBytesMax)));
   for (std::size_t at = 0; at < bytes.size();) {
@@ -59,13 +66,17 @@ void FetchCall::WriteNext() {
   }
   left_ -= static_cast<std::int64_t>(bytes.size());
   first_ = false;
-  StartWrite(&chunk_);
+  this->StartWrite(&chunk_);
 }
 
-void FetchCall::OnWriteDone(bool ok) {
+template <typename Chunk>
+void FileCall<Chunk>::OnWriteDone(bool ok) {
   if (!ok) return Refuse(absl::CancelledError("the client has gone"));
   chunk_.Clear();
   disk_.Run([this] { WriteNext(); });
 }
+
+template class FileCall<v1::FetchChunk>;
+template class FileCall<v1::ArtifactChunk>;
 
 }  // namespace vorocast::server

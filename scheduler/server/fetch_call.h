@@ -6,17 +6,19 @@
 
 #include <grpcpp/support/server_callback.h>
 
+#include "proto/artifacts.pb.h"
 #include "proto/jobs.pb.h"
 #include "scheduler/server/disk_threads.h"
 #include "services/base/status.h"
 
 namespace vorocast::server {
 
-/// One file on its way to a client. Owns itself until the call is over.
-class FetchCall final : public grpc::ServerWriteReactor<v1::FetchChunk> {
+/// One file on its way out, in chunks of a message that has `size`, `sha256` and `data`. Owns itself until the call is over.
+template <typename Chunk>
+class FileCall final : public grpc::ServerWriteReactor<Chunk> {
  public:
-  explicit FetchCall(DiskThreads& disk) : disk_(disk) {}
-  ~FetchCall() override;
+  explicit FileCall(DiskThreads& disk) : disk_(disk) {}
+  ~FileCall() override;
 
   /// Exactly one of these, once.
   void Send(const std::filesystem::path& path, const std::string& sha256);
@@ -31,10 +33,13 @@ class FetchCall final : public grpc::ServerWriteReactor<v1::FetchChunk> {
   void WriteNext();
 
   DiskThreads& disk_;
-  v1::FetchChunk chunk_;
+  Chunk chunk_;
   int file_ = -1;
   std::int64_t left_ = 0;
   bool first_ = true;
 };
+extern template class FileCall<v1::FetchChunk>;
+extern template class FileCall<v1::ArtifactChunk>;
+using FetchCall = FileCall<v1::FetchChunk>;
 
 }  // namespace vorocast::server

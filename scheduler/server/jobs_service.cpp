@@ -65,8 +65,12 @@ grpc::ServerUnaryReactor* JobsService::Submit(grpc::CallbackServerContext* conte
   if (!spec.ok()) return Answer(context, spec.status());
   const auto terms = TermsOf(*request);
   if (!terms.ok()) return Answer(context, terms.status());
+  const auto caller = rpc::CallerOf(*context, gate_);
+  if (!caller.ok()) return Answer(context, caller.status());
+  // Whose token it is, that user's job it is, whatever the client says.
+  const std::string user = caller->known ? caller->name : request->user();
   return AnswerInTurn<v1::Job>(
-      context, engine_, reply, [this, request, asked = *std::move(spec), terms = *terms](Turn& turn, v1::Job& job) -> absl::Status {
+      context, engine_, reply, [this, request, user, asked = *std::move(spec), terms = *terms](Turn& turn, v1::Job& job) -> absl::Status {
         plan::JobSpec whole = asked;
         ASSIGN_OR_RETURN(const CatalogueSequence* sequence, catalogue_.FindSequence(request->sequence_id()));
         SetCapture(sequence->opened, whole);
@@ -75,10 +79,9 @@ grpc::ServerUnaryReactor* JobsService::Submit(grpc::CallbackServerContext* conte
           if (!onto.ok()) return base::Annotate(onto.status(), "onto_sequence_id");
           SetOnto((*onto)->opened, whole);
         }
-        ASSIGN_OR_RETURN(const std::string id,
-                         catalogue_.Submit(turn, request->sequence_id(), request->user(), request->priority(), std::move(whole), terms));
-        spdlog::info("job submitted: job={} sequence={} take=\"{}\" user=\"{}\" priority={}", id, request->sequence_id(), sequence->opened.name,
-                     request->user(), request->priority());
+        ASSIGN_OR_RETURN(const std::string id, catalogue_.Submit(turn, request->sequence_id(), user, request->priority(), std::move(whole), terms));
+        spdlog::info("job submitted: job={} sequence={} take=\"{}\" user=\"{}\" priority={}", id, request->sequence_id(), sequence->opened.name, user,
+                     request->priority());
         return Show(turn, id, job);
       });
 }
@@ -144,28 +147,41 @@ grpc::ServerUnaryReactor* JobsService::Explain(grpc::CallbackServerContext* cont
   return reactor;
 }
 
+grpc::ServerUnaryReactor* JobsService::Change(grpc::CallbackServerContext* context, const std::string& id, v1::Job* reply,
+                                              std::function<absl::Status(Turn&)> change) {
+  auto caller = rpc::CallerOf(*context, gate_);
+  if (!caller.ok()) return Answer(context, caller.status());
+  return AnswerInTurn<v1::Job>(context, engine_, reply,
+                               [this, id, by = *std::move(caller), change = std::move(change)](Turn& turn, v1::Job& job) -> absl::Status {
+                                 ASSIGN_OR_RETURN(const CatalogueJob* known, catalogue_.FindJob(id));
+                                 if (!by.MayChange(known->added.user)) {
+                                   return absl::PermissionDeniedError(
+                                       fmt::format("job {} belongs to {}; to change it, {} needs the role operate", id, known->added.user, by.name));
+                                 }
+                                 RETURN_IF_ERROR(change(turn));
+                                 return Show(turn, id, job);
+                               });
+}
+
 grpc::ServerUnaryReactor* JobsService::Cancel(grpc::CallbackServerContext* context, const v1::JobRequest* request, v1::Job* reply) {
-  return AnswerInTurn<v1::Job>(context, engine_, reply, [this, request](Turn& turn, v1::Job& job) {
+  return Change(context, request->job_id(), reply, [request](Turn& turn) {
     turn.Apply(core::CancelJob{request->job_id()});
-    return Show(turn, request->job_id(), job);
+    return absl::OkStatus();
   });
 }
 
 grpc::ServerUnaryReactor* JobsService::Retry(grpc::CallbackServerContext* context, const v1::RetryJobRequest* request, v1::Job* reply) {
-  return AnswerInTurn<v1::Job>(context, engine_, reply, [this, request](Turn& turn, v1::Job& job) -> absl::Status {
+  return Change(context, request->job_id(), reply, [this, request](Turn& turn) -> absl::Status {
     ASSIGN_OR_RETURN(const CatalogueJob* known, catalogue_.FindJob(request->job_id()));
     core::JobTerms terms = known->added.terms;
     RETURN_IF_ERROR(SetLimits(*request, terms));
-    RETURN_IF_ERROR(catalogue_.Retry(turn, request->job_id(), terms));
-    return Show(turn, request->job_id(), job);
+    return catalogue_.Retry(turn, request->job_id(), terms);
   });
 }
 
 grpc::ServerUnaryReactor* JobsService::SetPaused(grpc::CallbackServerContext* context, const v1::JobRequest* request, v1::Job* reply, bool paused) {
-  return AnswerInTurn<v1::Job>(context, engine_, reply, [this, request, paused](Turn& turn, v1::Job& job) -> absl::Status {
-    RETURN_IF_ERROR(catalogue_.Pause(turn, request->job_id(), paused));
-    return Show(turn, request->job_id(), job);
-  });
+  return Change(context, request->job_id(), reply,
+                [this, request, paused](Turn& turn) { return catalogue_.Pause(turn, request->job_id(), paused); });
 }
 grpc::ServerUnaryReactor* JobsService::Pause(grpc::CallbackServerContext* context, const v1::JobRequest* request, v1::Job* reply) {
   return SetPaused(context, request, reply, true);

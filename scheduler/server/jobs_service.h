@@ -11,6 +11,7 @@
 #include "scheduler/server/fetch_call.h"
 #include "scheduler/server/fleet_note.h"
 #include "scheduler/server/watch_call.h"
+#include "services/rpc/gate.h"
 #include "services/storage/artifact_store.h"
 
 namespace vorocast::server {
@@ -20,8 +21,8 @@ class JobsService final : public v1::Jobs::CallbackService {
  public:
   /// All must outlive the service.
   JobsService(Engine& engine, Catalogue& catalogue, Watchers& watchers, const storage::ArtifactStore& artifacts, DiskThreads& disk,
-              const FleetNote& fleet)
-      : engine_(engine), catalogue_(catalogue), watchers_(watchers), artifacts_(artifacts), disk_(disk), fleet_(fleet) {}
+              const FleetNote& fleet, rpc::Gate* gate = nullptr)
+      : engine_(engine), catalogue_(catalogue), watchers_(watchers), artifacts_(artifacts), disk_(disk), fleet_(fleet), gate_(gate) {}
 
   grpc::ServerUnaryReactor* Submit(grpc::CallbackServerContext* context, const v1::SubmitJobRequest* request, v1::Job* reply) override;
   grpc::ServerUnaryReactor* Get(grpc::CallbackServerContext* context, const v1::JobRequest* request, v1::Job* reply) override;
@@ -42,6 +43,9 @@ class JobsService final : public v1::Jobs::CallbackService {
     std::string sha256;
   };
   absl::StatusOr<OutputFile> FindOutput(Turn& turn, const std::string& id, const std::string& name) const;
+  /// Does something to a job, for its owner or an operator only, and answers with the job as it is then.
+  grpc::ServerUnaryReactor* Change(grpc::CallbackServerContext* context, const std::string& id, v1::Job* reply,
+                                   std::function<absl::Status(Turn&)> change);
   /// Fills `reply` with the job as it is now.
   absl::Status Show(Turn& turn, const std::string& id, v1::Job& reply) const;
 
@@ -51,6 +55,7 @@ class JobsService final : public v1::Jobs::CallbackService {
   const storage::ArtifactStore& artifacts_;
   DiskThreads& disk_;
   const FleetNote& fleet_;
+  rpc::Gate* const gate_;
 };
 
 }  // namespace vorocast::server

@@ -20,6 +20,7 @@
 #include "scheduler/server/standby.h"
 #include "scheduler/store/postgres_store.h"
 #include "services/base/processor.h"
+#include "services/rpc/security_flags.h"
 #include "services/telemetry/telemetry_flags.h"
 
 namespace vorocast::server {
@@ -29,6 +30,7 @@ struct Options {
   std::string state;
   std::string database;
   std::string listen;
+  rpc::ServerSecurity security;
   fleet::FleetFlags fleet;
   telemetry::TelemetryFlags telemetry;
   CollectorFlags collector;
@@ -62,23 +64,60 @@ absl::Status Announce(const std::filesystem::path& state, const std::string& add
   return absl::OkStatus();
 }
 
+/// A socket in a folder that only this user can enter: workers of this machine and 'vorocast status --state' use it. Of this host, because several
+/// may share the state folder.
+absl::StatusOr<std::string> PrivateDoor(const std::filesystem::path& state) {
+  char host[256] = {};
+  if (gethostname(host, sizeof host - 1) != 0) return "";
+  const std::filesystem::path folder = state / "private";
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (!error) std::filesystem::permissions(folder, std::filesystem::perms::owner_all, error);
+  if (error) return absl::UnavailableError(fmt::format("{}: cannot be made private: {}", folder.string(), error.message()));
+  const std::string socket = (folder / fmt::format("{}.sock", host)).string();
+  if (socket.size() <= kUnixPathMax) return "unix:" + socket;
+  spdlog::warn("{}: too long for a socket; workers of this machine need a token and --tls-ca like all others", socket);
+  return "";
+}
+
+absl::StatusOr<rpc::ServerGuard> OpenGuard(const Options& options, const std::filesystem::path& state, const std::string& listen) {
+  rpc::ServerSecurity security = options.security;
+  // What no other machine reaches needs no certificate.
+  if (options.listen.empty()) security = {.tokens = options.security.tokens};
+  ASSIGN_OR_RETURN(rpc::ServerGuard guard, rpc::OpenGuard(security, [](const std::string& text) { spdlog::warn("{}", text); }));
+  if (guard.gate || guard.security.tls()) {
+    ASSIGN_OR_RETURN(guard.private_door, PrivateDoor(state));
+  }
+  spdlog::info("door: address={} guard=\"{}\"", listen, rpc::DescribeGuard(listen, guard));
+  if (rpc::IsUnguarded(listen, guard)) {
+    spdlog::warn(
+        "whoever reaches {} may submit, cancel and fetch, and take tasks: it asks for neither tokens nor client certificates; see 'Who may do "
+        "what' in docs/operations.md",
+        listen);
+  }
+  return guard;
+}
+
 absl::Status Serve(const Options& options, const sigset_t& stop_signals) {
   const std::filesystem::path state = std::filesystem::absolute(options.state).lexically_normal();
   RETURN_IF_ERROR(options.telemetry.StartLog("scheduler", state / "logs" / "scheduler.log"));
   const std::string listen = options.listen.empty() ? StableAddress(state) : options.listen;
+  ASSIGN_OR_RETURN(const rpc::ServerGuard guard, OpenGuard(options, state, listen));
   std::unique_ptr<SchedulerServer> server;
   if (options.database.empty()) {
-    ASSIGN_OR_RETURN(server, SchedulerServer::Start({.state = state, .listen = listen, .collection = options.collector.Parse()}));
+    ASSIGN_OR_RETURN(server, SchedulerServer::Start({.state = state, .listen = listen, .guard = guard, .collection = options.collector.Parse()}));
   } else {
     ASSIGN_OR_RETURN(std::unique_ptr<store::Store> store, store::OpenPostgresStore(options.database));
-    ASSIGN_OR_RETURN(const std::optional<std::string> address, AwaitLeadership(*store, listen, stop_signals));
+    ASSIGN_OR_RETURN(const std::optional<std::string> address, AwaitLeadership(*store, listen, guard, stop_signals));
     if (!address) return absl::OkStatus();
-    ASSIGN_OR_RETURN(server, SchedulerServer::Start({.state = state, .listen = *address, .collection = options.collector.Parse()}, std::move(store)));
+    ASSIGN_OR_RETURN(server, SchedulerServer::Start({.state = state, .listen = *address, .guard = guard, .collection = options.collector.Parse()},
+                                                    std::move(store)));
   }
   ASSIGN_OR_RETURN(const auto metrics, options.telemetry.StartMetrics(server->metrics()));
-  ASSIGN_OR_RETURN(std::vector<std::unique_ptr<fleet::Fleet>> fleets,
-                   options.fleet.Start(state, server->address(), [raw = server.get()] { return raw->Demand(); }));
-  RETURN_IF_ERROR(Announce(state, server->address()));
+  ASSIGN_OR_RETURN(
+      std::vector<std::unique_ptr<fleet::Fleet>> fleets,
+      options.fleet.Start(state, {.here = server->address_here(), .elsewhere = server->address()}, [raw = server.get()] { return raw->Demand(); }));
+  RETURN_IF_ERROR(Announce(state, server->address_here()));
   server->DescribeFleet([&fleets] { return fleet::Describe(fleets); });
   spdlog::info("serving: address={} state={} pid={}", server->address(), state.string(), getpid());
   int signal = 0;
@@ -115,6 +154,7 @@ int Main(int argc, char** argv) {
                  "postgresql://USER@HOST/NAME (default: SQLite in the state folder). Several schedulers may name one database and share the state "
                  "folder: one leads, the others stand by. The password comes from ~/.pgpass or PGPASSWORD");
   app.add_option("--listen", options.listen, "HOST:PORT or unix:/path (default: a socket in the state folder)");
+  rpc::AddServerSecurityFlags(app, options.security);
   options.fleet.AddTo(app);
   options.telemetry.AddTo(app);
   options.collector.AddTo(app);

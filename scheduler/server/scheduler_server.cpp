@@ -9,6 +9,7 @@
 #include <spdlog/spdlog.h>
 
 #include "scheduler/server/archive.h"
+#include "scheduler/server/artifacts_service.h"
 #include "scheduler/server/captures_service.h"
 #include "scheduler/server/demand.h"
 #include "scheduler/server/dispatch_service.h"
@@ -39,10 +40,11 @@ void EndProcess(const absl::Status& why) {
 
 /// In the order they are made; the destructor ends them in the order that none is used after its end.
 struct SchedulerServer::Parts {
-  Parts(std::unique_ptr<store::Store> leading, storage::ArtifactStore folder, std::function<void(const absl::Status&)> on_lost)
-      : lost(std::move(on_lost)), store(std::move(leading)), artifacts(std::move(folder)) {}
+  Parts(std::unique_ptr<store::Store> leading, storage::ArtifactStore folder, const SchedulerOptions& options)
+      : lost(options.lost ? options.lost : EndProcess), guard(options.guard), store(std::move(leading)), artifacts(std::move(folder)) {}
 
   const std::function<void(const absl::Status&)> lost;
+  const rpc::ServerGuard guard;
   std::unique_ptr<store::Store> store;
   /// From the start: a long queue is read before anything is written.
   LeadershipWatch leadership{*store, lost};
@@ -55,8 +57,9 @@ struct SchedulerServer::Parts {
   Archive archive{catalogue};
   std::unique_ptr<DiskThreads> disk = std::make_unique<DiskThreads>(kDiskThreads);
   CapturesService captures{engine, catalogue, artifacts, *disk, metrics};
-  JobsService jobs{engine, catalogue, watchers, artifacts, *disk, fleet};
-  DispatchService dispatch{engine, std::filesystem::absolute(artifacts.root()).lexically_normal().string()};
+  JobsService jobs{engine, catalogue, watchers, artifacts, *disk, fleet, guard.gate.get()};
+  DispatchService dispatch{engine, std::filesystem::absolute(artifacts.root()).lexically_normal().string(), guard.gate.get()};
+  ArtifactsService remote_artifacts{engine, *store, artifacts, *disk};
   std::unique_ptr<LookUpThread> look_ups;
   std::unique_ptr<Collector> collector;
   std::unique_ptr<rpc::Server> server;
@@ -120,6 +123,7 @@ const std::shared_ptr<prometheus::Registry>& SchedulerServer::metrics() const { 
 absl::StatusOr<CollectionPlan> SchedulerServer::Collect() { return parts_->collector->Collect(); }
 
 const std::string& SchedulerServer::address() const { return parts_->server->address(); }
+const std::string& SchedulerServer::address_here() const { return parts_->server->address_here(); }
 
 absl::StatusOr<fleet::Demand> SchedulerServer::Demand() const {
   const auto promise = std::make_shared<std::promise<fleet::Demand>>();
@@ -140,12 +144,14 @@ absl::StatusOr<std::unique_ptr<SchedulerServer>> SchedulerServer::Start(const Sc
 
 absl::StatusOr<std::unique_ptr<SchedulerServer>> SchedulerServer::Start(const SchedulerOptions& options, std::unique_ptr<store::Store> store) {
   ASSIGN_OR_RETURN(storage::ArtifactStore artifacts, storage::ArtifactStore::Open(options.state));
-  auto parts = std::make_unique<Parts>(std::move(store), std::move(artifacts), options.lost ? options.lost : EndProcess);
+  auto parts = std::make_unique<Parts>(std::move(store), std::move(artifacts), options);
   parts->metrics.SetTerm(parts->store->term());
   RETURN_IF_ERROR(parts->Restore());
   parts->StartEngine();
   parts->collector = std::make_unique<Collector>(parts->engine, parts->catalogue, parts->artifacts, parts->metrics, options.collection);
-  ASSIGN_OR_RETURN(parts->server, rpc::StartServer({.listen = options.listen, .services = {&parts->captures, &parts->jobs, &parts->dispatch}}));
+  ASSIGN_OR_RETURN(parts->server, rpc::StartServer({.listen = options.listen,
+                                                    .services = {&parts->captures, &parts->jobs, &parts->dispatch, &parts->remote_artifacts},
+                                                    .guard = parts->guard}));
   return std::unique_ptr<SchedulerServer>(new SchedulerServer(std::move(parts)));
 }
 

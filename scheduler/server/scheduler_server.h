@@ -12,12 +12,14 @@
 #include "scheduler/server/collector.h"
 #include "scheduler/store/store.h"
 #include "services/base/status.h"
+#include "services/rpc/security.h"
 
 namespace vorocast::server {
 
 struct SchedulerOptions {
   std::filesystem::path state;  // holds the artifact folder, and scheduler.db unless the state is kept elsewhere
   std::string listen;           // host:port or unix:/path
+  rpc::ServerGuard guard;       // by default nobody is asked who they are
   CollectorOptions collection;
   /// Told, from any thread, when this scheduler must not go on: another leads, or its store is damaged. By default the process ends.
   std::function<void(const absl::Status&)> lost;
@@ -38,6 +40,8 @@ class SchedulerServer {
   ~SchedulerServer();
 
   const std::string& address() const;
+  /// For processes of this user on this machine, which need neither certificate nor token there.
+  const std::string& address_here() const;
   /// What is left to do, for whoever provides workers. From any thread; UNAVAILABLE while the store cannot be written, or when it takes too long.
   absl::StatusOr<fleet::Demand> Demand() const;
   /// How who lists jobs is told where workers come from; called from any thread. Nothing: nobody manages them.

@@ -25,8 +25,9 @@ std::string AddressForOthers(const std::string& listen) {
   return fmt::format("{}:{}", host, listen.substr(colon + 1));
 }
 
-absl::StatusOr<std::optional<std::string>> AwaitLeadership(store::Store& store, const std::string& listen, const sigset_t& stop_signals) {
-  ASSIGN_OR_RETURN(const std::unique_ptr<StandbyServer> standby, StandbyServer::Start(listen));
+absl::StatusOr<std::optional<std::string>> AwaitLeadership(store::Store& store, const std::string& listen, const rpc::ServerGuard& guard,
+                                                           const sigset_t& stop_signals) {
+  ASSIGN_OR_RETURN(const std::unique_ptr<StandbyServer> standby, StandbyServer::Start(listen, guard));
   std::string said;
   while (true) {
     const auto term = store.Lead(AddressForOthers(standby->address()));

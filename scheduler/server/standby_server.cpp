@@ -14,9 +14,9 @@ class Refusal final : public grpc::ServerGenericBidiReactor {
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<StandbyServer>> StandbyServer::Start(const std::string& listen) {
+absl::StatusOr<std::unique_ptr<StandbyServer>> StandbyServer::Start(const std::string& listen, const rpc::ServerGuard& guard) {
   std::unique_ptr<StandbyServer> standby(new StandbyServer);
-  ASSIGN_OR_RETURN(standby->server_, rpc::StartServer({.listen = listen, .everything = standby.get()}));
+  ASSIGN_OR_RETURN(standby->server_, rpc::StartServer({.listen = listen, .everything = standby.get(), .guard = guard}));
   return standby;
 }
 

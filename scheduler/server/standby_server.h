@@ -16,7 +16,7 @@ namespace vorocast::server {
 /// the next one.
 class StandbyServer final : public grpc::CallbackGenericService {
  public:
-  static absl::StatusOr<std::unique_ptr<StandbyServer>> Start(const std::string& listen);
+  static absl::StatusOr<std::unique_ptr<StandbyServer>> Start(const std::string& listen, const rpc::ServerGuard& guard);
 
   /// What to listen on when this one has ended: the port is chosen.
   const std::string& address() const { return server_->address(); }

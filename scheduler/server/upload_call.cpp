@@ -1,16 +1,10 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "scheduler/server/upload_call.h"
 
-#include <fcntl.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
 
 #include <fmt/format.h>
 
-#include "services/rpc/limits.h"
 #include "services/rpc/status.h"
 
 namespace vorocast::server {
@@ -37,12 +31,6 @@ UploadCall::UploadCall(const storage::ArtifactStore& artifacts, DiskThreads& dis
   StartRead(&chunk_);
 }
 
-UploadCall::~UploadCall() {
-  if (file_ >= 0) close(file_);
-  std::error_code ignored;
-  if (!temporary_.empty()) std::filesystem::remove(temporary_, ignored);
-}
-
 void UploadCall::OnReadDone(bool ok) {
   disk_.Run([this, ok] { Take(ok); });
 }
@@ -57,41 +45,22 @@ void UploadCall::Take(bool ok) {
 }
 
 absl::Status UploadCall::Begin(const v1::Blob& blob) {
-  if (file_ >= 0) return absl::InvalidArgumentError("only the first message names the blob");
+  if (file_.begun()) return absl::InvalidArgumentError("only the first message names the blob");
   ASSIGN_OR_RETURN(digest_, CheckBlob(blob));
   blob_ = blob;
-  temporary_ = artifacts_.TemporaryPath(blob.extension());
-  file_ = open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
-  if (file_ < 0) return absl::UnavailableError(fmt::format("{}: cannot be written: {}", temporary_.string(), std::strerror(errno)));
-  return absl::OkStatus();
+  return file_.Begin(artifacts_.TemporaryPath(blob.extension()), blob.size(), fmt::format("blob {}", digest_.Short()));
 }
 
 absl::Status UploadCall::Write(const std::string& bytes) {
-  if (file_ < 0) return absl::InvalidArgumentError("the first message must name the blob");
-  if (static_cast<std::int64_t>(bytes.size()) > rpc::kChunkBytesMax) return absl::InvalidArgumentError("a chunk has at most 1 MiB");
-  if (written_ + static_cast<std::int64_t>(bytes.size()) > blob_.size()) {
-    return absl::DataLossError(fmt::format("blob {}: more bytes than the {} it should have", digest_.Short(), blob_.size()));
-  }
-  for (std::size_t at = 0; at < bytes.size();) {
-    const ssize_t count = write(file_, bytes.data() + at, bytes.size() - at);
-    if (count < 0 && errno == EINTR) continue;
-    if (count < 0 && errno == ENOSPC) return absl::ResourceExhaustedError("the artifact folder's disk is full");
-    if (count < 0) return absl::UnavailableError(fmt::format("{}: cannot be written: {}", temporary_.string(), std::strerror(errno)));
-    at += static_cast<std::size_t>(count);
-  }
-  written_ += static_cast<std::int64_t>(bytes.size());
-  return absl::OkStatus();
+  if (!file_.begun()) return absl::InvalidArgumentError("the first message must name the blob");
+  return file_.Write(bytes);
 }
 
 absl::Status UploadCall::Publish() {
-  if (file_ < 0) return absl::InvalidArgumentError("the first message must name the blob");
-  if (written_ != blob_.size()) {
-    return absl::DataLossError(fmt::format("blob {}: {} of {} bytes came; send it again", digest_.Short(), written_, blob_.size()));
-  }
-  close(file_);
-  file_ = -1;
-  RETURN_IF_ERROR(artifacts_.PublishBlob(temporary_, digest_, blob_.extension()));
-  metrics_.Uploaded(written_);
+  if (!file_.begun()) return absl::InvalidArgumentError("the first message must name the blob");
+  RETURN_IF_ERROR(file_.End().status());
+  RETURN_IF_ERROR(artifacts_.PublishBlob(file_.path(), digest_, blob_.extension()));
+  metrics_.Uploaded(blob_.size());
   return absl::OkStatus();
 }
 

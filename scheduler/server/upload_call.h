@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
-#include <cstdint>
-#include <filesystem>
-
 #include <grpcpp/support/server_callback.h>
 
 #include "proto/capture.pb.h"
 #include "scheduler/server/disk_threads.h"
+#include "scheduler/server/incoming_file.h"
 #include "scheduler/server/scheduler_metrics.h"
 #include "services/base/digest.h"
 #include "services/base/status.h"
@@ -23,7 +21,6 @@ class UploadCall final : public grpc::ServerReadReactor<v1::UploadChunk> {
  public:
   /// All must outlive the call.
   UploadCall(const storage::ArtifactStore& artifacts, DiskThreads& disk, SchedulerMetrics& metrics);
-  ~UploadCall() override;
 
   void OnReadDone(bool ok) override;
   void OnCancel() override {}
@@ -41,9 +38,7 @@ class UploadCall final : public grpc::ServerReadReactor<v1::UploadChunk> {
   v1::UploadChunk chunk_;
   v1::Blob blob_;
   base::Digest digest_;
-  std::filesystem::path temporary_;
-  int file_ = -1;
-  std::int64_t written_ = 0;
+  IncomingFile file_;
 };
 
 }  // namespace vorocast::server

@@ -41,6 +41,8 @@ void WorkStream::OnReadDone(bool ok) {
 }
 
 void WorkStream::Take(const v1::WorkerMessage& message) {
+  // A stream lasts as long as its worker; a token may be withdrawn before.
+  if (const auto caller = rpc::CallerOf(context_, service_.gate_); !caller.ok()) return End(caller.status());
   if (message.has_hello() != worker_.empty()) return End(absl::InvalidArgumentError("the first message, and only that, is a Hello"));
   auto event = EventOf(connection_, message);
   if (!event.ok()) return End(event.status());
@@ -64,12 +66,12 @@ void WorkStream::OnDone() {
   service_.Forget(connection_);
 }
 
-grpc::ServerBidiReactor<v1::WorkerMessage, v1::SchedulerMessage>* DispatchService::Work(grpc::CallbackServerContext*) {
+grpc::ServerBidiReactor<v1::WorkerMessage, v1::SchedulerMessage>* DispatchService::Work(grpc::CallbackServerContext* context) {
   std::shared_ptr<WorkStream> stream;
   {
     const std::lock_guard lock(mutex_);
     const core::ConnectionId connection = ++last_connection_;
-    stream = std::make_shared<WorkStream>(*this, connection);
+    stream = std::make_shared<WorkStream>(*this, connection, *context);
     streams_.emplace(connection, stream);
   }
   stream->Begin();

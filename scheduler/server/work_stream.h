@@ -21,7 +21,8 @@ class DispatchService;
 /// messages stays with its sender.
 class WorkStream final : public grpc::ServerBidiReactor<v1::WorkerMessage, v1::SchedulerMessage>, public std::enable_shared_from_this<WorkStream> {
  public:
-  WorkStream(DispatchService& service, core::ConnectionId connection) : service_(service), connection_(connection) {}
+  WorkStream(DispatchService& service, core::ConnectionId connection, grpc::CallbackServerContext& context)
+      : service_(service), connection_(connection), context_(context) {}
   /// Apart from the constructor because it needs the shared pointer.
   void Begin() { ReadNext(); }
 
@@ -40,6 +41,7 @@ class WorkStream final : public grpc::ServerBidiReactor<v1::WorkerMessage, v1::S
 
   DispatchService& service_;
   const core::ConnectionId connection_;
+  grpc::CallbackServerContext& context_;
   std::string worker_;  // read side only
   v1::WorkerMessage incoming_;
   std::mutex mutex_;

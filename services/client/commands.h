@@ -13,5 +13,6 @@ void AddLogCommands(CLI::App& program, int& exit_code);      // logs
 void AddReportCommand(CLI::App& program, int& exit_code);    // report
 void AddCaptureCommands(CLI::App& program, int& exit_code);  // inspect, synth
 void AddExportCommand(CLI::App& program, int& exit_code);    // export
+void AddTokenCommand(CLI::App& program, int& exit_code);     // token
 
 }  // namespace vorocast::client

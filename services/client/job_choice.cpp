@@ -15,12 +15,13 @@ void SchedulerFlags::AddTo(CLI::App& command) {
   command.add_option("--to", to, "Scheduler's address, HOST:PORT; A,B where one stands by (VOROCAST_SCHEDULER, or the one serving --state here)")
       ->envname("VOROCAST_SCHEDULER");
   command.add_option("--state", state, "State folder of a scheduler on this machine (~/.cache/vorocast)");
+  security.AddTo(command);
 }
 
 absl::StatusOr<SchedulerClient> SchedulerFlags::Connect() const {
-  if (!to.empty()) return SchedulerClient(to);
+  if (!to.empty()) return SchedulerClient::Open(to, security.Get());
   ASSIGN_OR_RETURN(const std::string address, RunningSchedulerAddress(state.empty() ? DefaultStateFolder() : std::filesystem::path(state)));
-  return SchedulerClient(address);
+  return SchedulerClient::Open(address, security.Get());
 }
 
 void JobChoice::AddTo(CLI::App& command) {

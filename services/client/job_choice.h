@@ -8,6 +8,7 @@
 
 #include "services/base/status.h"
 #include "services/client/scheduler_client.h"
+#include "services/rpc/security_flags.h"
 
 /// The flags by which a command finds its scheduler and its job.
 namespace vorocast::client {
@@ -15,6 +16,7 @@ namespace vorocast::client {
 /// Which scheduler is meant: --to, else $VOROCAST_SCHEDULER, else the one that serves --state on this machine.
 struct SchedulerFlags {
   std::string to, state;
+  rpc::ClientSecurityFlags security;
 
   void AddTo(CLI::App& command);
   absl::StatusOr<SchedulerClient> Connect() const;

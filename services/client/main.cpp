@@ -42,6 +42,7 @@ int main(int argc, char** argv) {
   vorocast::client::AddReportCommand(program, exit_code);
   vorocast::client::AddExportCommand(program, exit_code);
   vorocast::client::AddServiceCommands(program, exit_code);
+  vorocast::client::AddTokenCommand(program, exit_code);
   try {
     program.parse(JoinAxis(argc, argv));
   } catch (const CLI::ParseError& error) {

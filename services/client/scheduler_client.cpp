@@ -71,11 +71,16 @@ absl::Status UploadOnce(v1::Captures::Stub& captures, const v1::Blob& blob, cons
 
 }  // namespace
 
-SchedulerClient::SchedulerClient(const std::string& address) : address_(address) {
+SchedulerClient::SchedulerClient(const std::string& address) : SchedulerClient(*Open(address, {})) {}
+
+absl::StatusOr<SchedulerClient> SchedulerClient::Open(const std::string& address, const rpc::ClientSecurity& security) {
+  SchedulerClient client;
+  client.address_ = address;
   for (const std::string& each : rpc::SplitAddresses(address)) {
-    const auto channel = rpc::Connect(each);
-    schedulers_.push_back({v1::Captures::NewStub(channel), v1::Jobs::NewStub(channel)});
+    ASSIGN_OR_RETURN(const std::shared_ptr<grpc::Channel> channel, rpc::Connect(each, security));
+    client.schedulers_.push_back({v1::Captures::NewStub(channel), v1::Jobs::NewStub(channel)});
   }
+  return client;
 }
 
 absl::Status SchedulerClient::WithLeader(const std::function<absl::Status(const Scheduler&)>& call, const std::function<bool()>& interrupted) {

@@ -12,6 +12,7 @@
 #include "services/base/progress.h"
 #include "services/base/status.h"
 #include "services/capture/capture.h"
+#include "services/rpc/security.h"
 
 namespace vorocast::client {
 
@@ -21,6 +22,8 @@ class SchedulerClient {
   /// Several addresses, separated by commas, are the schedulers of one farm, of which one leads: when that dies, calls are tried again until
   /// another has taken over.
   explicit SchedulerClient(const std::string& address);
+  /// With TLS and a token. Errors as rpc::Connect's.
+  static absl::StatusOr<SchedulerClient> Open(const std::string& address, const rpc::ClientSecurity& security);
 
   const std::string& address() const { return address_; }
 
@@ -62,6 +65,7 @@ class SchedulerClient {
     std::unique_ptr<v1::Captures::Stub> captures;
     std::unique_ptr<v1::Jobs::Stub> jobs;
   };
+  SchedulerClient() = default;
   absl::Status UploadBlob(const v1::Blob& blob, const std::filesystem::path& path);
   absl::Status FetchOnce(const std::string& job_id, const v1::Output& output, const std::filesystem::path& path);
   /// Calls `call` with the scheduler in use, and while that is UNAVAILABLE with the next one, for a while.

@@ -93,11 +93,10 @@ v1::Finished FailedAttempt(const v1::AttemptId& id, v1::Failed::Cause cause, std
   return finished;
 }
 
-Attempt::Attempt(v1::Lease lease, fs::path program, storage::ArtifactStore store, std::function<void(v1::Finished)> on_end)
-    : lease_(std::move(lease)),
-      program_(std::move(program)),
-      store_(std::move(store)),
-      thread_([this, on_end = std::move(on_end)] { on_end(Run()); }) {}
+Attempt::Attempt(v1::Lease lease, fs::path program, storage::ArtifactStore store, std::function<void(v1::Finished)> on_end, RemoteArtifacts* remote)
+    : lease_(std::move(lease)), program_(std::move(program)), store_(std::move(store)), remote_(remote), thread_([this, on_end = std::move(on_end)] {
+        on_end(Run());
+      }) {}
 
 Attempt::~Attempt() {
   Stop();
@@ -106,6 +105,12 @@ Attempt::~Attempt() {
 
 v1::Finished Attempt::Fail(v1::Failed::Cause cause, std::string_view message, double seconds) const {
   return FailedAttempt(lease_.id(), cause, message, seconds);
+}
+
+/// Bytes that arrive broken again and again are broken where they come from.
+v1::Finished Attempt::FailTransfer(const absl::Status& status, double seconds) const {
+  if (stop_.stopped()) return Fail(v1::Failed::DRAINED, "stopped before it was done", seconds);
+  return Fail(absl::IsDataLoss(status) ? v1::Failed::INPUT : v1::Failed::STORE, std::string(status.message()), seconds);
 }
 
 v1::Finished Attempt::Run() {
@@ -120,6 +125,12 @@ v1::Finished Attempt::RunSpec(const tasks::TaskSpec& spec) {
   const std::string_view extension = tasks::Extension(spec.kind);
   if (store_.HasArtifact(spec.Key(), extension)) return Publish(spec, {}, {});
 
+  std::vector<ArtifactCache::Hold> inputs;
+  if (remote_) {
+    absl::StatusOr<std::vector<ArtifactCache::Hold>> brought = remote_->Bring(spec, stop_);
+    if (!brought.ok()) return FailTransfer(brought.status(), 0);
+    inputs = *std::move(brought);
+  }
   const TemporaryFile output{store_.TemporaryPath(extension)};
   const ChildTask task{spec, store_.root(), output.path, lease_.memory_limit(), ::getpid()};
   ChildCommand command{program_, {"execute-task"}, Encode(task)};
@@ -167,6 +178,11 @@ v1::Finished Attempt::Publish(const tasks::TaskSpec& spec, const fs::path& outpu
   if (!output.empty()) {
     const absl::Status published = store_.PublishArtifact(output, key, extension);
     if (!published.ok()) return Fail(v1::Failed::STORE, std::string(published.message()), end.seconds);
+  }
+  if (remote_) {
+    const absl::Status delivered = remote_->Deliver(key, extension, stop_);
+    // The result could not be put, whatever the reason: that is the store's failure and not the input's.
+    if (!delivered.ok()) return FailTransfer(absl::UnavailableError(delivered.message()), end.seconds);
   }
   const fs::path path = store_.ArtifactPath(key, extension);
   const absl::StatusOr<base::Digest> digest = base::HashFile(path);

@@ -10,6 +10,7 @@
 
 #include "proto/dispatch.pb.h"
 #include "services/lease/child_process.h"
+#include "services/lease/remote_artifacts.h"
 #include "services/storage/artifact_store.h"
 #include "services/tasks/task.h"
 
@@ -18,8 +19,10 @@ namespace vorocast::lease {
 /// One attempt at one task under way: its child process, watched by a thread of its own. The result is published before the end is told.
 class Attempt {
  public:
-  /// Starts at once. `on_end` is called once, from the attempt's thread. Destroying an attempt stops it and waits.
-  Attempt(v1::Lease lease, std::filesystem::path program, storage::ArtifactStore store, std::function<void(v1::Finished)> on_end);
+  /// Starts at once. `remote`, which must outlive the attempt, brings inputs into `store` and takes results from it; null where `store` is the shared
+  /// folder. `on_end` is called once, from the attempt's thread. Destroying an attempt stops it and waits.
+  Attempt(v1::Lease lease, std::filesystem::path program, storage::ArtifactStore store, std::function<void(v1::Finished)> on_end,
+          RemoteArtifacts* remote = nullptr);
   ~Attempt();
 
   /// Kills the child; the attempt then ends as given back (DRAINED).
@@ -34,11 +37,13 @@ class Attempt {
   v1::Finished Judge(const tasks::TaskSpec& spec, const std::filesystem::path& output, const ChildEnd& child,
                      const std::optional<absl::Status>& outcome) const;
   v1::Finished Publish(const tasks::TaskSpec& spec, const std::filesystem::path& output, const ChildEnd& end) const;
+  v1::Finished FailTransfer(const absl::Status& status, double seconds) const;
   v1::Finished Fail(v1::Failed::Cause cause, std::string_view message, double seconds) const;
 
   const v1::Lease lease_;
   const std::filesystem::path program_;
   const storage::ArtifactStore store_;
+  RemoteArtifacts* const remote_;
   StopFlag stop_;
   std::atomic<double> fraction_ = 0;
   std::thread thread_;  // last: it uses the others

@@ -6,10 +6,11 @@
 #include <CLI/CLI.hpp>
 
 #include "services/lease/lease_loop.h"
+#include "services/rpc/security_flags.h"
 
 namespace vorocast::lease {
 
-/// --slots, --name, --drain-time and --leave-after: what every program that takes leases lets its user choose.
+/// --slots, --name, --drain-time, --leave-after, --artifacts, --cache and how to connect: what every program that takes leases lets its user choose.
 class LeaseFlags {
  public:
   /// `slots_help` says what a slot is; `options` gives the defaults and must outlive the parsing.
@@ -20,6 +21,10 @@ class LeaseFlags {
  private:
   double drain_s_ = 0;
   double leave_after_s_ = 0;
+  rpc::ClientSecurityFlags security_;
+  std::string artifacts_ = "shared";
+  std::string cache_;
+  double cache_limit_gib_ = 20;
 };
 
 }  // namespace vorocast::lease

@@ -17,6 +17,7 @@
 #include "services/lease/drain_signals.h"
 #include "services/lease/event_queue.h"
 #include "services/lease/lease_metrics.h"
+#include "services/lease/remote_artifacts.h"
 #include "services/rpc/channel.h"
 
 namespace vorocast::lease {
@@ -73,12 +74,14 @@ class Deadline {
 class LeaseLoop {
  public:
   LeaseLoop(const LeaseLoopOptions& options, const std::vector<tasks::Kind>& kinds)
-      : options_(options), name_(options.name.empty() ? DefaultName() : options.name), kinds_(kinds) {
-    for (const std::string& address : rpc::SplitAddresses(options.scheduler))
-      schedulers_.push_back({address, v1::Dispatch::NewStub(rpc::Connect(address))});
-  }
+      : options_(options), name_(options.name.empty() ? DefaultName() : options.name), kinds_(kinds) {}
 
   absl::Status Run() {
+    for (const std::string& address : rpc::SplitAddresses(options_.scheduler)) {
+      ASSIGN_OR_RETURN(const std::shared_ptr<grpc::Channel> channel, rpc::Connect(address, options_.security));
+      schedulers_.push_back({address, v1::Dispatch::NewStub(channel)});
+    }
+    if (options_.artifacts_remote) RETURN_IF_ERROR(OpenCache());
     const DrainSignals signals([this] { events_.Push(DrainRequested{}); });
     reconnect_.Set(absl::ZeroDuration());
     NoteAway();
@@ -120,6 +123,7 @@ class LeaseLoop {
 
   void ConnectAgain() {
     reconnect_.Clear();
+    // The first call fails when the connection does, so that a wrong certificate is told and not waited out; later ones wait for the scheduler.
     const bool only_one = schedulers_.size() == 1;
     welcome_.Set(only_one ? kWelcomeTime : kWelcomeTimeOfSeveral);
     v1::Hello hello;
@@ -131,7 +135,7 @@ class LeaseLoop {
       if (!dropped_.contains(key)) *hello.add_holding() = IdOf(key);
     }
     for (const auto& [key, report] : reports_) *hello.add_holding() = IdOf(key);
-    stream_ = std::make_unique<DispatchStream>(*scheduler().stub, ++stream_number_, std::move(hello), events_, only_one);
+    stream_ = std::make_unique<DispatchStream>(*scheduler().stub, ++stream_number_, std::move(hello), events_, only_one && lost_);
   }
 
   void NoteAway() {
@@ -184,12 +188,22 @@ class LeaseLoop {
     away_.Clear();
     lost_ = false;
     backoff_ = kReconnectFirst;
-    OpenStore(welcome.artifact_root());
-    Log(fmt::format("takes tasks: scheduler={} slots={} results=\"{}\"", scheduler().address, options_.slots, welcome.artifact_root()));
+    if (!remote_) OpenStore(welcome.artifact_root());
+    Log(fmt::format("takes tasks: scheduler={} slots={} results=\"{}\"", scheduler().address, options_.slots,
+                    remote_ ? "to it, by way of " + options_.cache.string() : welcome.artifact_root()));
     for (const v1::AttemptId& id : welcome.drop()) Drop(id);
     for (const auto& [key, report] : reports_) SendReport(report);
     if (draining_) SendLeaving();
     SendHeartbeat();
+  }
+
+  absl::Status OpenCache() {
+    ASSIGN_OR_RETURN(
+        remote_, RemoteArtifacts::Open(
+                     {.scheduler = options_.scheduler, .security = options_.security, .cache = options_.cache, .cache_limit = options_.cache_limit}));
+    store_ = remote_->store();
+    store_->RemoveStaleTemporaries(kLeftoverAge);
+    return absl::OkStatus();
   }
 
   void OpenStore(const std::string& root) {
@@ -217,8 +231,9 @@ class LeaseLoop {
         Conclude(FailedAttempt(lease.id(), v1::Failed::STORE, std::string(store_.status().message()), 0));
         continue;
       }
-      running_.emplace(key, std::make_unique<Attempt>(std::move(lease), options_.program, *store_,
-                                                      [this](v1::Finished finished) { events_.Push(AttemptEnded{std::move(finished)}); }));
+      running_.emplace(key, std::make_unique<Attempt>(
+                                std::move(lease), options_.program, *store_,
+                                [this](v1::Finished finished) { events_.Push(AttemptEnded{std::move(finished)}); }, remote_.get()));
     }
   }
 
@@ -340,6 +355,7 @@ class LeaseLoop {
   EventQueue events_;          // outlives everything below, which pushes to it
 
   absl::StatusOr<storage::ArtifactStore> store_ = absl::UnavailableError("the scheduler has not said yet where the artifact folder is");
+  std::unique_ptr<RemoteArtifacts> remote_;  // outlives the attempts
   std::map<AttemptKey, v1::Lease> waiting_;
   std::map<AttemptKey, std::unique_ptr<Attempt>> running_;
   std::set<AttemptKey> dropped_;  // of running_: stopped because nobody wants the result

@@ -9,6 +9,7 @@
 #include "absl/time/time.h"
 #include "services/base/status.h"
 #include "services/lease/executor.h"
+#include "services/rpc/security.h"
 
 namespace vorocast::lease {
 
@@ -20,9 +21,13 @@ inline constexpr std::size_t kNameMax = 200;
 
 struct LeaseLoopOptions {
   std::string scheduler;          // host:port, or unix:/path; several, separated by commas, of which one leads
+  rpc::ClientSecurity security;   // how to connect to it
   std::int32_t slots = 1;         // tasks at once
   std::filesystem::path program;  // run as `program execute-task` for each task
-  std::string name;               // empty: host, pid, start time
+  bool artifacts_remote = false;  // inputs and results go through the scheduler, by way of `cache`; otherwise through the shared folder
+  std::filesystem::path cache;
+  std::int64_t cache_limit = std::int64_t{20} << 30;  // bytes
+  std::string name;                                   // empty: host, pid, start time
   absl::Duration heartbeat = absl::Seconds(2);
   absl::Duration leave_after = absl::InfiniteDuration();  // leaves by itself when the scheduler has been away so long
   absl::Duration drain_time = absl::Seconds(30);          // after SIGTERM, what still runs then is given back

@@ -16,6 +16,7 @@
 #include "services/lease/lease_flags.h"
 #include "services/lease/lease_loop.h"
 #include "services/lease/lease_metrics.h"
+#include "services/rpc/security_flags.h"
 #include "services/rpc/server.h"
 #include "services/simulation/simulate_executor.h"
 #include "services/simulation/simulation_service.h"
@@ -36,6 +37,7 @@ struct Options {
   telemetry::TelemetryFlags telemetry;
   std::string listen;
   std::string store;
+  rpc::ServerSecurity security;
 };
 
 /// Until SIGTERM or SIGINT.
@@ -60,7 +62,12 @@ absl::Status Serve(Options& options) {
     ASSIGN_OR_RETURN(storage::ArtifactStore store, storage::ArtifactStore::Open(options.store));
     service = std::make_unique<simulation::SimulationService>(
         simulation::SimulationService::Options{.store = std::move(store), .program = options.lease.program, .runs_max = options.lease.slots});
-    ASSIGN_OR_RETURN(server, rpc::StartServer({.listen = options.listen, .services = {service.get()}}));
+    const auto log = [](const std::string& text) { fmt::print(stderr, "vorocast-simulation: {}\n", text); };
+    ASSIGN_OR_RETURN(const rpc::ServerGuard guard, rpc::OpenGuard(options.security, log));
+    if (rpc::IsUnguarded(options.listen, guard)) {
+      log(fmt::format("whoever reaches {} may run simulations: it asks for neither tokens nor client certificates", options.listen));
+    }
+    ASSIGN_OR_RETURN(server, rpc::StartServer({.listen = options.listen, .services = {service.get()}, .guard = guard}));
     fmt::print("{}\n", server->address());
     std::fflush(stdout);
   }
@@ -86,6 +93,7 @@ int main(int argc, char** argv) {
       app.add_option("--listen", options.listen, "Answers gRPC here: HOST:PORT, port 0 for any free one, or unix:/PATH. The address is printed");
   CLI::Option* store = app.add_option("--store", options.store, "The artifact folder for runs asked for over --listen");
   listen->needs(store);
+  rpc::AddServerSecurityFlags(app, options.security);
   lease::LeaseFlags flags;
   flags.AddTo(app, options.lease, "Simulations at once, from each side");
   options.telemetry.AddTo(app);
