@@ -11,7 +11,7 @@ packages=(
   # geometry, kernels, physics, pictures
   libeigen3-dev libcgal-dev libtet1.5-dev libfftw3-dev libbullet-dev libembree-dev libtbb-dev libpng-dev libopenexr-dev libmurmurhash-dev libdraco-dev libnanoflann-dev libtinygltf-dev ffmpeg
   # storage and state
-  libhdf5-dev libsqlite3-dev libpq-dev libssl-dev
+  libhdf5-dev libsqlite3-dev libpq-dev libssl-dev openssl
   # everyday libraries
   libspdlog-dev libfmt-dev libcli11-dev nlohmann-json3-dev prometheus-cpp-dev
   # peers that benchmarks measure beside

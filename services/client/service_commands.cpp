@@ -49,7 +49,7 @@ void AddServe(CLI::App& program, int& exit_code) {
 
 void AddWorker(CLI::App& program, int& exit_code) {
   struct Flags {
-    std::string scheduler;
+    std::string scheduler, cache;
     rpc::ClientSecurityFlags security;
     std::int32_t slots = 1;
   };
@@ -57,9 +57,12 @@ void AddWorker(CLI::App& program, int& exit_code) {
   CLI::App& command = *program.add_subcommand("worker", "Take tasks from a scheduler until stopped");
   command.add_option("--scheduler", flags->scheduler, "Its address, HOST:PORT; A,B where one stands by")->required();
   command.add_option("--slots", flags->slots, "Tasks at once")->capture_default_str()->check(CLI::Range(1, 1024));
+  command.add_option("--cache", flags->cache,
+                     "For a machine that does not see the scheduler's state folder: files come and go through the scheduler and this folder");
   flags->security.AddTo(command);
   command.callback([flags, &exit_code] {
     std::vector<std::string> arguments = {"--scheduler", flags->scheduler, "--slots", std::to_string(flags->slots)};
+    if (!flags->cache.empty()) arguments.insert(arguments.end(), {"--artifacts", "remote", "--cache", flags->cache});
     const std::vector<std::string> security = rpc::ArgumentsOf(flags->security.Get());
     arguments.insert(arguments.end(), security.begin(), security.end());
     exit_code = PrintError(BecomeProgram("vorocast-worker", arguments));

@@ -19,8 +19,9 @@ namespace {
 
 constexpr char kStory[] =
     "Takes tasks from a Vorocast scheduler and runs each in a process of its own, with its memory and time limits.\n"
-    "Results go to the shared artifact folder that the scheduler names. When the scheduler is away, the worker goes on with\n"
-    "what it holds and connects again. SIGTERM or Ctrl-C lets it finish what runs and leave; a second one stops at once.\n"
+    "Results go to the shared artifact folder that the scheduler names, or through the scheduler (--artifacts remote). When the\n"
+    "scheduler is away, the worker goes on with what it holds and connects again. SIGTERM or Ctrl-C lets it finish what runs and\n"
+    "leave; a second one stops at once.\n"
     "It exits with code 75 when it had to give tasks back then, so that a cluster may start it again elsewhere.";
 
 }  // namespace
