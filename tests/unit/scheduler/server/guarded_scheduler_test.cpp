@@ -75,7 +75,7 @@ class GuardedScheduler : public testing::Test {
     open.set_name("take");
     open.set_frames_per_second(25);
     open.set_metres_per_unit(1);
-    open.set_up("y");
+    open.set_up("+y");
     const auto sequence = Call<v1::Captures>("anna", &v1::Captures::Stub::Open, open);
     EXPECT_TRUE(sequence.ok()) << sequence.status();
     const std::string bytes = "a frame";
