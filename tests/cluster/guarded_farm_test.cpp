@@ -25,7 +25,7 @@ class GuardedFarm : public testing::Test {
     ASSERT_FALSE(UndisturbedDigests().empty());
     folder_ = Scratch() / "guarded";
     std::filesystem::create_directories(folder_);
-    std::ofstream(Tokens());
+    std::ofstream(Tokens(), std::ios::out);
     for (const char* role : {"submit", "work", "read", "operate"}) MakeToken(role, role);
     scheduler_ = std::make_unique<Running>(
         Arguments{"--state", state().string(), "--listen", "127.0.0.1:0", "--server-certificate", certificates_.Certificate("server"), "--server-key",
