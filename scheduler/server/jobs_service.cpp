@@ -180,8 +180,7 @@ grpc::ServerUnaryReactor* JobsService::Retry(grpc::CallbackServerContext* contex
 }
 
 grpc::ServerUnaryReactor* JobsService::SetPaused(grpc::CallbackServerContext* context, const v1::JobRequest* request, v1::Job* reply, bool paused) {
-  return Change(context, request->job_id(), reply,
-                [this, request, paused](Turn& turn) { return catalogue_.Pause(turn, request->job_id(), paused); });
+  return Change(context, request->job_id(), reply, [this, request, paused](Turn& turn) { return catalogue_.Pause(turn, request->job_id(), paused); });
 }
 grpc::ServerUnaryReactor* JobsService::Pause(grpc::CallbackServerContext* context, const v1::JobRequest* request, v1::Job* reply) {
   return SetPaused(context, request, reply, true);

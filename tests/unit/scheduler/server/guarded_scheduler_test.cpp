@@ -202,6 +202,13 @@ TEST_F(GuardedScheduler, OnlyItsOwnerOrAnOperatorChangesAJob) {
   EXPECT_EQ(others.code(), absl::StatusCode::kPermissionDenied);
   EXPECT_THAT(std::string(others.message()), HasSubstr("belongs to anna"));
   EXPECT_EQ(Cancel("farm", job).code(), absl::StatusCode::kPermissionDenied);
+  v1::JobRequest request;
+  request.set_job_id(job);
+  for (const auto method : {&v1::Jobs::Stub::Pause, &v1::Jobs::Stub::Resume}) {
+    EXPECT_EQ(Call<v1::Jobs>("bob", method, request).status().code(), absl::StatusCode::kPermissionDenied);
+    EXPECT_TRUE(Call<v1::Jobs>("anna", method, request).ok());
+    EXPECT_TRUE(Call<v1::Jobs>("olga", method, request).ok());
+  }
   EXPECT_TRUE(Cancel("anna", job).ok());
   v1::RetryJobRequest retry;
   retry.set_job_id(job);
