@@ -40,7 +40,10 @@ tasks::TaskSpec SpecOf(const State& state, const Task& task) {
     }
     const Task& maker = state.tasks[input.task];
     VOROCAST_CHECK(HasEnded(maker));
-    if (const auto* done = std::get_if<Done>(&maker.state)) named.digest = done->key;
+    if (const auto* done = std::get_if<Done>(&maker.state)) {
+      named.digest = done->key;
+      named.content = done->result.sha256;
+    }
   }
   return spec;
 }

@@ -97,8 +97,16 @@ absl::Status CheckFieldNames(const nlohmann::json& json, const std::string& plac
   return absl::OkStatus();
 }
 
+absl::StatusOr<std::optional<base::Digest>> DigestOrNull(const nlohmann::json& json, const std::string& place) {
+  if (json.is_null()) return std::nullopt;
+  if (!json.is_string()) return Refuse(place, "64 lower-case hexadecimal digits, or null where there is none");
+  absl::StatusOr<base::Digest> parsed = base::Digest::FromHex(json.get_ref<const std::string&>());
+  if (!parsed.ok()) return base::Annotate(parsed.status(), place);
+  return *parsed;
+}
+
 absl::StatusOr<Input> InputFromJson(const nlohmann::json& json, const std::string& place) {
-  RETURN_IF_ERROR(CheckFieldNames(json, place, {"role", "frame", "source", "extension", "digest"}));
+  RETURN_IF_ERROR(CheckFieldNames(json, place, {"role", "frame", "source", "extension", "digest", "content"}));
   Input input;
   const nlohmann::json& role = json["role"];
   if (!role.is_string() || std::find(kRoles.begin(), kRoles.end(), role.get_ref<const std::string&>()) == kRoles.end()) {
@@ -119,21 +127,20 @@ absl::StatusOr<Input> InputFromJson(const nlohmann::json& json, const std::strin
   if (!IsExtension(json["extension"])) return Refuse(place + ".extension", "a dot and 1 to 8 lower-case letters or digits");
   input.extension = json["extension"].get<std::string>();
 
-  const nlohmann::json& digest = json["digest"];
-  if (digest.is_null()) return input;
-  if (!digest.is_string()) return Refuse(place + ".digest", "64 lower-case hexadecimal digits, or null for an input that is missing");
-  absl::StatusOr<base::Digest> parsed = base::Digest::FromHex(digest.get_ref<const std::string&>());
-  if (!parsed.ok()) return base::Annotate(parsed.status(), place + ".digest");
-  input.digest = *parsed;
+  ASSIGN_OR_RETURN(input.digest, DigestOrNull(json["digest"], place + ".digest"));
+  ASSIGN_OR_RETURN(input.content, DigestOrNull(json["content"], place + ".content"));
   return input;
 }
+
+nlohmann::json HexOrNull(const std::optional<base::Digest>& digest) { return digest ? nlohmann::json(digest->Hex()) : nlohmann::json(); }
 
 nlohmann::json ToJson(const Input& input) {
   return {{"role", input.role},
           {"frame", input.frame},
           {"source", input.source == Input::Source::kBlob ? "blob" : "artifact"},
           {"extension", input.extension},
-          {"digest", input.digest ? nlohmann::json(input.digest->Hex()) : nlohmann::json()}};
+          {"digest", HexOrNull(input.digest)},
+          {"content", HexOrNull(input.content)}};
 }
 
 }  // namespace

@@ -46,6 +46,8 @@ struct Input {
   std::string extension;  // of the stored file, with its dot: ".ply", ".h5"
   /// Empty for an optional input whose own task failed for good: its frame is interpolated.
   std::optional<base::Digest> digest;
+  /// SHA-256 of an artifact's bytes as they were when it was made, where that is known: who reads it can tell damage. No part of a result's name.
+  std::optional<base::Digest> content;
 };
 
 /// A task with everything its result depends on.

@@ -65,6 +65,28 @@ TEST(Damage, ResultsThatWereDamagedInTheStoreAreMadeAnewByARetry) {
   EXPECT_EQ(farm.FetchedDigests(), UndisturbedDigests());
 }
 
+TEST(Damage, AResultThatIsDamagedBeforeItIsReadEndsInAnErrorAndNeverInAnotherResult) {
+  ASSERT_FALSE(UndisturbedDigests().empty());
+  Farm farm({.folder = Scratch() / "damaged-early"});
+  // Frames only: nothing that reads their cells is planned before the take is over.
+  const fs::path stage = Scratch() / "damaged-early" / "stage";
+  fs::create_directories(stage);
+  for (const auto& entry : fs::directory_iterator(SmallCapture())) {
+    if (entry.path().extension() != ".h5") fs::copy(entry.path(), stage);
+  }
+  Running follower(farm.SubmitArguments(stage, {"--follow", "--settle", "50", "--idle", "0", "--watch"}));
+  ASSERT_TRUE(Eventually([&] { return Results(farm.state()).size() >= 13; })) << "twelve frames and a template";
+  for (const fs::path& result : Results(farm.state())) FlipABit(result);
+  std::ofstream(stage / "capture.done").close();
+  const Outcome failed = follower.Wait();
+  EXPECT_EQ(failed.exit_code, 1) << failed.output;
+  EXPECT_NE(failed.output.find("is damaged in the store; 'vorocast retry'"), std::string::npos) << failed.output;
+  EXPECT_EQ(RunProgram({"retry", "--to", farm.address()}).exit_code, 0);
+  const Outcome watched = RunProgram({"watch", "--to", farm.address()});
+  EXPECT_EQ(watched.exit_code, 0) << watched.output;
+  EXPECT_EQ(farm.FetchedDigests(), UndisturbedDigests());
+}
+
 /// A file system of its own for a farm's folder, in a mount namespace that ends with this process.
 class Disk {
  public:

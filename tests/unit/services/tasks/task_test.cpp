@@ -18,7 +18,7 @@ using ::testing::HasSubstr;
 TaskSpec GuideSpec() {
   TaskSpec spec{Kind::kGuide, ToJson(GuideOptions()), {}};
   spec.inputs.push_back({"template", -1, Input::Source::kArtifact, ".h5", base::HashBytes("template")});
-  spec.inputs.push_back({"cells", 0, Input::Source::kArtifact, ".h5", base::HashBytes("cells 0")});
+  spec.inputs.push_back({"cells", 0, Input::Source::kArtifact, ".h5", base::HashBytes("cells 0"), base::HashBytes("bytes of cells 0")});
   spec.inputs.push_back({"cells", 1, Input::Source::kArtifact, ".h5", std::nullopt});
   return spec;
 }
@@ -40,6 +40,13 @@ TEST(TaskSpec, GoesBothWaysWithItsKey) {
   EXPECT_EQ(read->Key(), spec.Key());
   EXPECT_EQ(ToJson(*read), ToJson(spec));
   EXPECT_FALSE(read->inputs[2].digest.has_value());
+  EXPECT_EQ(read->inputs[1].content, base::HashBytes("bytes of cells 0"));
+}
+
+TEST(TaskSpec, KeyDoesNotDependOnWhatIsKnownOfTheInputsBytes) {
+  TaskSpec spec = GuideSpec();
+  spec.inputs[1].content.reset();
+  EXPECT_EQ(spec.Key(), GuideSpec().Key());
 }
 
 TEST(TaskSpec, KeyDependsOnEverythingTheResultDependsOn) {
@@ -99,6 +106,7 @@ TEST(TaskSpec, WhatComesOverAWireIsNotBelieved) {
   EXPECT_THAT(Refusal([](json& value) { value["inputs"][1]["source"] = "web"; }), HasSubstr("inputs[1].source"));
   EXPECT_THAT(Refusal([](json& value) { value["inputs"][1]["extension"] = "/../x"; }), HasSubstr("inputs[1].extension"));
   EXPECT_THAT(Refusal([](json& value) { value["inputs"][1]["digest"] = "../../etc/passwd"; }), HasSubstr("inputs[1].digest"));
+  EXPECT_THAT(Refusal([](json& value) { value["inputs"][1]["content"] = "abc"; }), HasSubstr("inputs[1].content"));
   EXPECT_THAT(Refusal([](json& value) { value["inputs"][1].erase("digest"); }), HasSubstr("inputs[1].digest"));
   EXPECT_THAT(Refusal([](json& value) { value["inputs"] = std::vector<int>(40001, 1); }), HasSubstr("at most 40000"));
 }

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "services/lease/input_check.h"
+
+#include <sys/stat.h>
+
+#include <cerrno>
+#include <cstring>
+
+#include <fmt/format.h>
+
+#include "services/base/digest.h"
+
+namespace vorocast::lease {
+namespace {
+
+/// More than a long take has files; beyond it everything is simply read once more.
+constexpr std::size_t kRemembered = 100'000;
+
+std::int64_t Nanoseconds(const timespec& time) { return std::int64_t{time.tv_sec} * 1'000'000'000 + time.tv_nsec; }
+
+}  // namespace
+
+absl::StatusOr<InputCheck::Stamp> InputCheck::StampOf(const std::string& path) {
+  struct stat facts {};
+  if (stat(path.c_str(), &facts) != 0) return absl::NotFoundError(fmt::format("{}: {}", path, std::strerror(errno)));
+  return Stamp{facts.st_ino, facts.st_size, Nanoseconds(facts.st_mtim), Nanoseconds(facts.st_ctim)};
+}
+
+absl::Status InputCheck::CheckFile(const std::string& path, const base::Digest& expected) {
+  ASSIGN_OR_RETURN(const Stamp stamp, StampOf(path));
+  {
+    const std::lock_guard lock(mutex_);
+    if (const auto found = right_.find(path); found != right_.end() && found->second == stamp) return absl::OkStatus();
+  }
+  ASSIGN_OR_RETURN(const base::Digest digest, base::HashFile(path));
+  if (digest != expected) {
+    return absl::DataLossError(
+        fmt::format("{}: its bytes are not those that were stored ({} instead of {})", path, digest.Short(), expected.Short()));
+  }
+  const std::lock_guard lock(mutex_);
+  if (right_.size() >= kRemembered) right_.clear();
+  right_[path] = stamp;
+  return absl::OkStatus();
+}
+
+absl::Status InputCheck::Check(const tasks::TaskSpec& spec, const storage::ArtifactStore& store) {
+  for (const tasks::Input& input : spec.inputs) {
+    if (!input.digest) continue;
+    absl::Status status;
+    if (input.source == tasks::Input::Source::kBlob) {
+      status = CheckFile(store.BlobPath(*input.digest, input.extension), *input.digest);
+      if (absl::IsDataLoss(status))
+        return base::Annotate(status, "a captured frame is damaged in the store; remove the file and send the take again");
+    } else if (input.content) {
+      status = CheckFile(store.ArtifactPath(*input.digest, input.extension), *input.content);
+      if (absl::IsDataLoss(status)) return base::Annotate(status, "a result is damaged in the store; 'vorocast retry' of the job makes it anew");
+    }
+    RETURN_IF_ERROR(status);
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace vorocast::lease
