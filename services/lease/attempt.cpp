@@ -93,10 +93,14 @@ v1::Finished FailedAttempt(const v1::AttemptId& id, v1::Failed::Cause cause, std
   return finished;
 }
 
-Attempt::Attempt(v1::Lease lease, fs::path program, storage::ArtifactStore store, std::function<void(v1::Finished)> on_end, RemoteArtifacts* remote)
-    : lease_(std::move(lease)), program_(std::move(program)), store_(std::move(store)), remote_(remote), thread_([this, on_end = std::move(on_end)] {
-        on_end(Run());
-      }) {}
+Attempt::Attempt(v1::Lease lease, fs::path program, storage::ArtifactStore store, InputCheck& inputs, std::function<void(v1::Finished)> on_end,
+                 RemoteArtifacts* remote)
+    : lease_(std::move(lease)),
+      program_(std::move(program)),
+      store_(std::move(store)),
+      inputs_(inputs),
+      remote_(remote),
+      thread_([this, on_end = std::move(on_end)] { on_end(Run()); }) {}
 
 Attempt::~Attempt() {
   Stop();
@@ -125,11 +129,16 @@ v1::Finished Attempt::RunSpec(const tasks::TaskSpec& spec) {
   const std::string_view extension = tasks::Extension(spec.kind);
   if (store_.HasArtifact(spec.Key(), extension)) return Publish(spec, {}, {});
 
-  std::vector<ArtifactCache::Hold> inputs;
+  std::vector<ArtifactCache::Hold> held;
   if (remote_) {
     absl::StatusOr<std::vector<ArtifactCache::Hold>> brought = remote_->Bring(spec, stop_);
     if (!brought.ok()) return FailTransfer(brought.status(), 0);
-    inputs = *std::move(brought);
+    held = *std::move(brought);
+  }
+  if (const absl::Status right = inputs_.Check(spec, store_); !right.ok()) {
+    // Damage does not pass: a few attempts, in case only this worker reads it so. What is not there may be a folder that is away.
+    const auto cause = absl::IsDataLoss(right) ? v1::Failed::INTERNAL : v1::Failed::STORE;
+    return Fail(cause, std::string(right.message()), 0);
   }
   const TemporaryFile output{store_.TemporaryPath(extension)};
   const ChildTask task{spec, store_.root(), output.path, lease_.memory_limit(), ::getpid()};

@@ -10,6 +10,7 @@
 
 #include "proto/dispatch.pb.h"
 #include "services/lease/child_process.h"
+#include "services/lease/input_check.h"
 #include "services/lease/remote_artifacts.h"
 #include "services/storage/artifact_store.h"
 #include "services/tasks/task.h"
@@ -19,9 +20,9 @@ namespace vorocast::lease {
 /// One attempt at one task under way: its child process, watched by a thread of its own. The result is published before the end is told.
 class Attempt {
  public:
-  /// Starts at once. `remote`, which must outlive the attempt, brings inputs into `store` and takes results from it; null where `store` is the shared
-  /// folder. `on_end` is called once, from the attempt's thread. Destroying an attempt stops it and waits.
-  Attempt(v1::Lease lease, std::filesystem::path program, storage::ArtifactStore store, std::function<void(v1::Finished)> on_end,
+  /// Starts at once. `inputs` must outlive the attempt, as must `remote`, which brings inputs into `store` and takes results from it; null where
+  /// `store` is the shared folder. `on_end` is called once, from the attempt's thread. Destroying an attempt stops it and waits.
+  Attempt(v1::Lease lease, std::filesystem::path program, storage::ArtifactStore store, InputCheck& inputs, std::function<void(v1::Finished)> on_end,
           RemoteArtifacts* remote = nullptr);
   ~Attempt();
 
@@ -43,6 +44,7 @@ class Attempt {
   const v1::Lease lease_;
   const std::filesystem::path program_;
   const storage::ArtifactStore store_;
+  InputCheck& inputs_;
   RemoteArtifacts* const remote_;
   StopFlag stop_;
   std::atomic<double> fraction_ = 0;

@@ -16,6 +16,7 @@
 #include "services/lease/dispatch_stream.h"
 #include "services/lease/drain_signals.h"
 #include "services/lease/event_queue.h"
+#include "services/lease/input_check.h"
 #include "services/lease/lease_metrics.h"
 #include "services/lease/remote_artifacts.h"
 #include "services/rpc/channel.h"
@@ -232,7 +233,7 @@ class LeaseLoop {
         continue;
       }
       running_.emplace(key, std::make_unique<Attempt>(
-                                std::move(lease), options_.program, *store_,
+                                std::move(lease), options_.program, *store_, inputs_,
                                 [this](v1::Finished finished) { events_.Push(AttemptEnded{std::move(finished)}); }, remote_.get()));
     }
   }
@@ -354,6 +355,7 @@ class LeaseLoop {
   std::size_t scheduler_ = 0;  // the one in use
   EventQueue events_;          // outlives everything below, which pushes to it
 
+  InputCheck inputs_;  // the attempts use it
   absl::StatusOr<storage::ArtifactStore> store_ = absl::UnavailableError("the scheduler has not said yet where the artifact folder is");
   std::unique_ptr<RemoteArtifacts> remote_;  // outlives the attempts
   std::map<AttemptKey, v1::Lease> waiting_;

@@ -6,6 +6,7 @@
 #include <future>
 
 #include "services/lease/attempt.h"
+#include "services/lease/input_check.h"
 #include "services/rpc/status.h"
 #include "services/simulation/effect.h"
 #include "services/simulation/shipped_effects.h"
@@ -87,7 +88,8 @@ grpc::Status SimulationService::Run(grpc::ServerContext* context, const v1::RunR
   lease.set_spec_json(tasks::ToJson(spec).dump());
   std::promise<v1::Finished> promise;
   std::future<v1::Finished> ended = promise.get_future();
-  lease::Attempt attempt(lease, options_.program, options_.store, [&](v1::Finished finished) { promise.set_value(std::move(finished)); });
+  lease::InputCheck inputs;
+  lease::Attempt attempt(lease, options_.program, options_.store, inputs, [&](v1::Finished finished) { promise.set_value(std::move(finished)); });
   v1::RunProgress progress;
   while (ended.wait_for(kReportInterval) != std::future_status::ready) {
     if (context->IsCancelled()) {
