@@ -76,6 +76,8 @@ TEST(Damage, AResultThatIsDamagedBeforeItIsReadEndsInAnErrorAndNeverInAnotherRes
   }
   Running follower(farm.SubmitArguments(stage, {"--follow", "--settle", "50", "--idle", "0", "--watch"}));
   ASSERT_TRUE(Eventually([&] { return Results(farm.state()).size() >= 13; })) << "twelve frames and a template";
+  // Their digests are on record too, not only the files there.
+  ASSERT_TRUE(Eventually([&] { return RunProgram({"explain", "--to", farm.address()}).output.find("waits for frames") != std::string::npos; }));
   for (const fs::path& result : Results(farm.state())) FlipABit(result);
   std::ofstream(stage / "capture.done").close();
   const Outcome failed = follower.Wait();
