@@ -3,6 +3,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -10,6 +11,7 @@
 #include "services/client/percent_view.h"
 #include "services/client/run_job.h"
 #include "services/interchange/gltf.h"
+#include "services/interchange/pieces.h"
 #include "services/interchange/ply_sequence.h"
 #include "services/interchange/point_cache.h"
 #include "services/interchange/usd.h"
@@ -22,17 +24,20 @@ namespace fs = std::filesystem;
 struct Format {
   const char* extension;  // of the default name; empty for a folder
   absl::Status (*write)(const interchange::MovingCells&, const fs::path&, const base::Progress&);
+  bool has_objects;  // scene objects have a place in it
 };
 
 const std::map<std::string, Format>& Formats() {
   using interchange::MovingCells;
   using interchange::PointCache;
   static const std::map<std::string, Format> formats = {
-      {"gltf", {".glb", &interchange::WriteGltf}},
-      {"usd", {".usda", &interchange::WriteUsd}},
-      {"ply", {"", &interchange::WritePlySequence}},
-      {"pc2", {".pc2", [](const MovingCells& t, const fs::path& p, const base::Progress& g) { return WritePointCache(t, PointCache::kPc2, p, g); }}},
-      {"mdd", {".mdd", [](const MovingCells& t, const fs::path& p, const base::Progress& g) { return WritePointCache(t, PointCache::kMdd, p, g); }}},
+      {"gltf", {".glb", &interchange::WriteGltf, true}},
+      {"usd", {".usda", &interchange::WriteUsd, true}},
+      {"ply", {"", &interchange::WritePlySequence, false}},
+      {"pc2",
+       {".pc2", [](const MovingCells& t, const fs::path& p, const base::Progress& g) { return WritePointCache(t, PointCache::kPc2, p, g); }, false}},
+      {"mdd",
+       {".mdd", [](const MovingCells& t, const fs::path& p, const base::Progress& g) { return WritePointCache(t, PointCache::kMdd, p, g); }, false}},
   };
   return formats;
 }
@@ -51,6 +56,21 @@ fs::path DefaultName(const ExportFlags& flags, const Format& format) {
   return folder / (*format.extension == '\0' ? name + "-ply" : name + format.extension);
 }
 
+/// "5000 cells, 812 copied cells, 3 scene objects": what there is of each.
+std::string ContentOf(const interchange::MovingCells& take) {
+  std::size_t copied = 0;
+  std::size_t turning = 0;
+  for (const interchange::Piece& piece : interchange::PiecesOf(take)) {
+    copied += piece.copy >= 0;
+    turning += piece.pair >= 0;
+  }
+  std::string content = fmt::format("{} cells", take.cell_count());
+  if (copied > 0) content += fmt::format(", {} copied cells", copied);
+  if (turning > 0) content += fmt::format(", {} cells that turn into another take's", turning);
+  if (!take.objects.empty()) content += fmt::format(", {} scene object{}", take.objects.size(), take.objects.size() == 1 ? "" : "s");
+  return content;
+}
+
 absl::Status Export(const ExportFlags& flags) {
   const Format& format = Formats().at(flags.format);
   ASSIGN_OR_RETURN(interchange::MovingCells take, interchange::ReadMovingCells(flags.take, flags.tracked));
@@ -61,9 +81,12 @@ absl::Status Export(const ExportFlags& flags) {
   PercentView view("Export");
   RETURN_IF_ERROR(format.write(take, out, [&](double fraction) { view.Show(fraction); }));
   view.Finish();
-  if (take.has_more) fmt::print("Copies and cells that turn into another take's are not exported: this has the take's own cells only.\n");
-  fmt::print("Wrote {}: {} cells and {} scene objects at {} instants, {:.2f} s\n", out.string(), take.cell_count(), take.objects.size(),
-             take.instant_count(), take.time.back() - take.time.front());
+  fmt::print("Wrote {}: {} at {} instants, {:.2f} s\n", out.string(), ContentOf(take), take.instant_count(), take.time.back() - take.time.front());
+  if (!format.has_objects && !take.objects.empty()) {
+    std::vector<std::string> names;
+    for (const geometry::SceneObject& object : take.objects) names.push_back(object.name);
+    fmt::print("Left out, because {} carries cells only: {}. glTF and USD carry scene objects too.\n", flags.format, fmt::join(names, ", "));
+  }
   return absl::OkStatus();
 }
 

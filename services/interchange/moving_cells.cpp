@@ -44,6 +44,29 @@ MovingCells FromTracked(geometry::TrackedTake&& take) {
   return moving;
 }
 
+/// Copies have as many rows at an instant as there are of them.
+void KeepEveryOfCopies(std::size_t n, geometry::CellCopies& copies) {
+  if (copies.offset.empty()) return;
+  std::vector<std::int64_t> offset = {0};
+  std::size_t kept = 0;
+  for (std::size_t s = 0; s + 1 < copies.offset.size(); s += n) {
+    for (auto row = static_cast<std::size_t>(copies.offset[s]); row < static_cast<std::size_t>(copies.offset[s + 1]); ++row, ++kept) {
+      copies.copy[kept] = copies.copy[row];
+      copies.cell[kept] = copies.cell[row];
+      copies.rotation[kept] = copies.rotation[row];
+      copies.translation[kept] = copies.translation[row];
+      copies.scale[kept] = copies.scale[row];
+    }
+    offset.push_back(static_cast<std::int64_t>(kept));
+  }
+  copies.offset = std::move(offset);
+  copies.copy.resize(kept);
+  copies.cell.resize(kept);
+  copies.rotation.resize(kept);
+  copies.translation.resize(kept);
+  copies.scale.resize(kept);
+}
+
 }  // namespace
 
 Rigid3 MovingCells::Pose(std::size_t instant, std::size_t cell) const {
@@ -80,7 +103,8 @@ absl::StatusOr<MovingCells> ReadMovingCells(const fs::path& take, const fs::path
   moving.translation = std::move(simulated.cell_translation);
   moving.state = std::move(simulated.cell_state);
   moving.scale = std::move(simulated.cell_scale);
-  moving.has_more = !simulated.copies.offset.empty() || !simulated.morph.vertex_offset.empty();
+  moving.copies = std::move(simulated.copies);
+  moving.morph = std::move(simulated.morph);
   moving.objects = std::move(simulated.objects);
   moving.object_pose = std::move(simulated.object_pose);
   return moving;
@@ -100,6 +124,12 @@ void KeepEvery(std::size_t n, MovingCells& take) {
   keep(take.state, take.cell_count());
   if (!take.scale.empty()) keep(take.scale, take.cell_count());
   keep(take.object_pose, take.objects.size());
+  KeepEveryOfCopies(n, take.copies);
+  const std::size_t pairs = take.morph.source.size();
+  keep(take.morph.blend, pairs);
+  keep(take.morph.scale, pairs);
+  keep(take.morph.rotation, pairs);
+  keep(take.morph.translation, pairs);
   keep(take.time, 1);  // last: the others count by it
 }
 

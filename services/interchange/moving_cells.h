@@ -19,7 +19,8 @@ struct MovingCells {
   std::vector<geometry::Vec3> translation;     // [S*n] world_from_template
   std::vector<geometry::CellState> state;      // [S*n]; all recalled where nothing was simulated
   std::vector<float> scale;                    // [S*n] 0 … 1, or empty: cells keep their size
-  bool has_more = false;                       // the take has copies or morphing cells, which are not in here
+  geometry::CellCopies copies;                 // time persistence
+  geometry::CellMorphs morph;                  // cells on their way into another take's
   std::vector<geometry::SceneObject> objects;  // [m]
   std::vector<geometry::Rigid3> object_pose;   // [S*m] world_from_object
 
@@ -46,7 +47,8 @@ struct CellShape {
     bool skin = false;               // on the surface of the captured shape; else a cut between two cells
     std::int32_t neighbour = -1;     // the cell on the other side of a cut
   };
-  std::vector<geometry::Vec3> vertices;  // metres, the centroid is the origin
+  std::vector<geometry::Vec3> vertices;     // metres, the centroid is the origin
+  std::vector<geometry::Vec3> vertices_to;  // where they go, of a cell that turns into another; else empty
   std::vector<Face> faces;
 };
 CellShape ShapeOfCell(const geometry::Cells& cells, std::size_t cell);

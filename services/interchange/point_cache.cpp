@@ -10,10 +10,11 @@
 
 #include <fmt/format.h>
 
+#include "services/interchange/pieces.h"
+
 namespace vorocast::interchange {
 namespace {
 
-using geometry::Rigid3;
 using geometry::Vec3;
 
 void Append(std::uint32_t bits, std::endian order, std::string& bytes) {
@@ -43,20 +44,24 @@ std::string MddHead(const MovingCells& take, std::uint32_t vertices) {
   return head;
 }
 
-absl::Status WriteObj(const MovingCells& take, const std::vector<CellShape>& shapes, const std::filesystem::path& path) {
+/// The mesh that the cache moves: the cells at the first instant, and what comes later where it comes, so that no face of it is without extent.
+absl::Status WriteObj(const MovingCells& take, const std::vector<Piece>& pieces, const std::vector<CellShape>& shapes,
+                      const std::filesystem::path& path) {
   std::ofstream file(path, std::ios::trunc);
-  file << "# Vorocast: the cells at the first instant, metres, y up\n";
+  file << "# Vorocast: the cells at the first instant, copies and pairs where they come, metres, y up\n";
   std::int64_t first = 1;  // OBJ counts from one
-  for (std::size_t cell = 0; cell < shapes.size(); ++cell) {
-    const Rigid3 world_from_shape = WorldFromShape(take, 0, cell);
-    std::string text = fmt::format("g cell_{:05d}\n", cell);
-    for (const Vec3& vertex : shapes[cell].vertices) {
-      const Vec3 x = world_from_shape * vertex;
+  for (const Piece& piece : pieces) {
+    const CellShape& shape = shapes[piece.shape];
+    Placement placement = PlacementOf(take, piece, piece.first);
+    placement.size = 1;
+    std::string text = fmt::format("g {}\n", piece.Name());
+    for (std::size_t v = 0; v < shape.vertices.size(); ++v) {
+      const Vec3 x = WorldVertex(shape, placement, v);
       text += fmt::format("v {:.7g} {:.7g} {:.7g}\n", x.x(), x.y(), x.z());
     }
     for (const bool skin : {true, false}) {
       bool any = false;
-      for (const CellShape::Face& face : shapes[cell].faces) {
+      for (const CellShape::Face& face : shape.faces) {
         if (face.skin != skin) continue;
         if (!any) text += skin ? "usemtl skin\n" : "usemtl cut\n";
         any = true;
@@ -65,7 +70,7 @@ absl::Status WriteObj(const MovingCells& take, const std::vector<CellShape>& sha
         text += "\n";
       }
     }
-    first += static_cast<std::int64_t>(shapes[cell].vertices.size());
+    first += static_cast<std::int64_t>(shape.vertices.size());
     file << text;
   }
   file.close();
@@ -76,17 +81,15 @@ absl::Status WriteObj(const MovingCells& take, const std::vector<CellShape>& sha
 }  // namespace
 
 absl::Status WritePointCache(const MovingCells& take, PointCache format, const std::filesystem::path& path, const base::Progress& progress) {
-  std::vector<CellShape> shapes;
+  const std::vector<Piece> pieces = PiecesOf(take);
+  const std::vector<CellShape> shapes = ShapesOf(take);
   std::size_t vertices = 0;
-  for (std::size_t cell = 0; cell < take.cell_count(); ++cell) {
-    shapes.push_back(ShapeOfCell(take.model.cells, cell));
-    vertices += shapes.back().vertices.size();
-  }
+  for (const Piece& piece : pieces) vertices += shapes[piece.shape].vertices.size();
   if (vertices > std::numeric_limits<std::int32_t>::max() || take.instant_count() > std::numeric_limits<std::int32_t>::max()) {
     return absl::ResourceExhaustedError(
         fmt::format("{}: a point cache cannot count {} vertices at {} instants", path.string(), vertices, take.instant_count()));
   }
-  RETURN_IF_ERROR(WriteObj(take, shapes, std::filesystem::path(path).replace_extension(".obj")));
+  RETURN_IF_ERROR(WriteObj(take, pieces, shapes, std::filesystem::path(path).replace_extension(".obj")));
 
   const std::endian order = format == PointCache::kPc2 ? std::endian::little : std::endian::big;
   std::ofstream file(path, std::ios::binary | std::ios::trunc);
@@ -94,11 +97,11 @@ absl::Status WritePointCache(const MovingCells& take, PointCache format, const s
   file << (format == PointCache::kPc2 ? Pc2Head(take, count) : MddHead(take, count));
   for (std::size_t s = 0; s < take.instant_count(); ++s) {
     std::string bytes;
-    for (std::size_t cell = 0; cell < shapes.size(); ++cell) {
-      const Rigid3 world_from_shape = WorldFromShape(take, s, cell);
-      const double size = take.Size(s, cell);
-      for (const Vec3& vertex : shapes[cell].vertices) {
-        const Vec3 x = world_from_shape * (size * vertex);
+    for (const Piece& piece : pieces) {
+      const CellShape& shape = shapes[piece.shape];
+      const Placement placement = PlacementOf(take, piece, s);
+      for (std::size_t v = 0; v < shape.vertices.size(); ++v) {
+        const Vec3 x = WorldVertex(shape, placement, v);
         for (const double coordinate : {x.x(), x.y(), x.z()}) Append(static_cast<float>(coordinate), order, bytes);
       }
     }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "services/interchange/usd.h"
 
+#include <algorithm>
 #include <cctype>
 #include <fstream>
 #include <iterator>
@@ -8,6 +9,8 @@
 #include <string>
 
 #include <fmt/format.h>
+
+#include "services/interchange/pieces.h"
 
 namespace vorocast::interchange {
 namespace {
@@ -62,8 +65,7 @@ std::string Material(const char* name, const char* colour) {
       name, colour);
 }
 
-std::string Prototype(const MovingCells& take, std::size_t cell) {
-  const CellShape shape = ShapeOfCell(take.model.cells, cell);
+std::string Prototype(const CellShape& shape, std::size_t cell) {
   std::vector<std::int32_t> counts, indices, skin, cut;
   for (std::size_t f = 0; f < shape.faces.size(); ++f) {
     const CellShape::Face& face = shape.faces[f];
@@ -117,60 +119,148 @@ std::string Head(const MovingCells& take) {
       take.time.front() * take.frames_per_second, take.time.back() * take.frames_per_second, take.frames_per_second, take.frames_per_second);
 }
 
+/// The instants from `first` to `last`, both included.
+struct Span {
+  std::size_t first, last;
+};
+Span WholeTake(const MovingCells& take) { return {0, take.instant_count() - 1}; }
+
 /// One attribute's time samples, one line an instant, written as they are made: a take's are too many to hold.
 template <typename Value>
-void WriteSamples(const MovingCells& take, const char* attribute, std::ofstream& file, Value value) {
+void WriteSamples(const MovingCells& take, const Span& span, const char* attribute, std::ofstream& file, Value value) {
   file << "        " << attribute << ".timeSamples = {\n";
-  for (std::size_t s = 0; s < take.instant_count(); ++s)
+  for (std::size_t s = span.first; s <= span.last; ++s)
     file << fmt::format("            {:.6g}: ", take.time[s] * take.frames_per_second) << value(s) << ",\n";
   file << "        }\n";
+}
+
+/// What is there from the first to the last instant of `span` only.
+void WriteVisibility(const MovingCells& take, const Span& span, std::ofstream& file) {
+  const Span around = {span.first == 0 ? 0 : span.first - 1, std::min(span.last + 1, take.instant_count() - 1)};
+  WriteSamples(take, around, "token visibility", file,
+               [&](std::size_t s) { return s < span.first || s > span.last ? "\"invisible\"" : "\"inherited\""; });
+}
+
+std::string Orientation(const geometry::Quat& q) { return fmt::format("({:.5g}, {:.5g}, {:.5g}, {:.5g})", q.w(), q.x(), q.y(), q.z()); }
+
+/// What every instancer of cells says of its instances, which show the cells of `pieces`.
+void WriteInstances(const MovingCells& take, std::span<const Piece> pieces, std::ofstream& file) {
+  const auto per_instance = [&](const char* name, const std::vector<std::int32_t>& values) {
+    file << "        int[] primvars:" << name << " = "
+         << List(pieces.size(), [&](std::size_t i, auto& out) { fmt::format_to(out, "{}", values[static_cast<std::size_t>(pieces[i].cell)]); })
+         << " (\n            interpolation = \"vertex\"\n        )\n";
+  };
+  file << "        int[] protoIndices = " << List(pieces.size(), [](std::size_t i, auto& out) { fmt::format_to(out, "{}", i); }) << "\n";
+  per_instance("patch", take.model.patch);
+  per_instance("component", take.model.cells.component);
+  file << "        rel prototypes = "
+       << List(pieces.size(), [&](std::size_t i, auto& out) { fmt::format_to(out, "</Take/Cells/Prototypes/cell_{:05d}>", pieces[i].cell); }) << "\n";
+}
+
+/// Where instances are, how large, and which are not there.
+void WriteInstanceSamples(const MovingCells& take, std::span<const Piece> pieces, const Span& span, bool with_scales, std::ofstream& file,
+                          const base::Progress& progress) {
+  const double samples = 2.0 * static_cast<double>(span.last - span.first + 1);
+  double done = 0;
+  WriteSamples(take, span, "point3f[] positions", file, [&](std::size_t s) {
+    std::vector<Vec3> positions;
+    for (const Piece& piece : pieces) positions.push_back(PlacementOf(take, piece, s).world_from_shape.translation);
+    base::Report(progress, ++done / samples);
+    return Triples(positions);
+  });
+  WriteSamples(take, span, "quath[] orientations", file, [&](std::size_t s) {
+    base::Report(progress, ++done / samples);
+    return List(pieces.size(), [&](std::size_t i, auto& out) {
+      out = std::ranges::copy(Orientation(PlacementOf(take, pieces[i], s).world_from_shape.rotation), out).out;
+    });
+  });
+  if (with_scales) {
+    WriteSamples(take, span, "float3[] scales", file, [&](std::size_t s) {
+      return List(pieces.size(),
+                  [&](std::size_t i, auto& out) { fmt::format_to(out, "({0:.4g}, {0:.4g}, {0:.4g})", PlacementOf(take, pieces[i], s).size); });
+    });
+  }
+  WriteSamples(take, span, "int64[] invisibleIds", file, [&](std::size_t s) {
+    std::vector<std::size_t> gone;
+    for (std::size_t i = 0; i < pieces.size(); ++i) {
+      if (PlacementOf(take, pieces[i], s).size == 0) gone.push_back(i);
+    }
+    return Numbers<std::size_t>(gone);
+  });
+}
+
+/// All cells of one copy of the performer: an instancer of its own, which has samples for its own time only.
+void WriteCopy(const MovingCells& take, std::span<const Piece> pieces, std::ofstream& file) {
+  Span span{pieces.front().first, pieces.front().last};
+  for (const Piece& piece : pieces) span = {std::min(span.first, piece.first), std::max(span.last, piece.last)};
+  file << fmt::format("    def PointInstancer \"copy_{:03d}\"\n    {{\n", pieces.front().copy);
+  WriteInstances(take, pieces, file);
+  WriteVisibility(take, span, file);
+  WriteInstanceSamples(take, pieces, span, /*with_scales=*/true, file, {});
+  file << "    }\n";
+}
+
+/// A cell that turns into another take's: a mesh whose points move within it while it does.
+void WritePair(const MovingCells& take, const Piece& piece, const CellShape& shape, std::ofstream& file) {
+  std::vector<std::int32_t> counts, indices;
+  for (const CellShape::Face& face : shape.faces) {
+    counts.push_back(static_cast<std::int32_t>(face.loop.size()));
+    indices.insert(indices.end(), face.loop.begin(), face.loop.end());
+  }
+  const Span span{piece.first, piece.last};
+  const auto placement = [&](std::size_t s) { return PlacementOf(take, piece, s); };
+  file << fmt::format("    def Mesh \"{}\" (\n        prepend apiSchemas = [\"MaterialBindingAPI\"]\n    )\n    {{\n", piece.Name())
+       << "        uniform token subdivisionScheme = \"none\"\n        uniform token orientation = \"rightHanded\"\n        int[] faceVertexCounts = "
+       << Numbers<std::int32_t>(counts) << "\n        int[] faceVertexIndices = " << Numbers<std::int32_t>(indices)
+       << "\n        rel material:binding = </Take/Materials/turning>\n";
+  // Once it has arrived, its points stay where they are: the last samples would only repeat.
+  std::size_t settled = span.last;
+  while (settled > span.first && placement(settled - 1).blend == placement(span.last).blend) --settled;
+  WriteSamples(take, {span.first, settled}, "point3f[] points", file, [&](std::size_t s) {
+    std::vector<Vec3> points;
+    const Placement here{.size = 1, .blend = placement(s).blend};
+    for (std::size_t v = 0; v < shape.vertices.size(); ++v) points.push_back(WorldVertex(shape, here, v));
+    return Triples(points);
+  });
+  WriteVisibility(take, span, file);
+  WriteSamples(take, span, "double3 xformOp:translate", file, [&](std::size_t s) {
+    const Vec3 x = placement(s).world_from_shape.translation;
+    return fmt::format("({:.7g}, {:.7g}, {:.7g})", x.x(), x.y(), x.z());
+  });
+  WriteSamples(take, span, "quatf xformOp:orient", file, [&](std::size_t s) { return Orientation(placement(s).world_from_shape.rotation); });
+  WriteSamples(take, span, "float3 xformOp:scale", file,
+               [&](std::size_t s) { return fmt::format("({0:.6g}, {0:.6g}, {0:.6g})", placement(s).size); });
+  file << "        uniform token[] xformOpOrder = [\"xformOp:translate\", \"xformOp:orient\", \"xformOp:scale\"]\n    }\n";
 }
 
 }  // namespace
 
 absl::Status WriteUsd(const MovingCells& take, const std::filesystem::path& path, const base::Progress& progress) {
+  const std::vector<Piece> pieces = PiecesOf(take);
+  const std::vector<CellShape> shapes = ShapesOf(take);
+  const std::span<const Piece> all(pieces);
   const std::size_t n = take.cell_count();
   std::ofstream file(path, std::ios::trunc);
   file << Head(take);
   file << "    def Scope \"Materials\"\n    {\n"
-       << Material("skin", "(0.80, 0.62, 0.48)") << Material("cut", "(0.45, 0.12, 0.08)") << Material("object", "(0.50, 0.50, 0.52)") << "    }\n";
-  file << "    def PointInstancer \"Cells\"\n    {\n        int[] protoIndices = "
-       << List(n, [](std::size_t i, auto& out) { fmt::format_to(out, "{}", i); }) << "\n";
-  file << "        int[] primvars:patch = " << Numbers<std::int32_t>(take.model.patch) << " (\n            interpolation = \"vertex\"\n        )\n";
-  file << "        int[] primvars:component = " << Numbers<std::int32_t>(take.model.cells.component)
-       << " (\n            interpolation = \"vertex\"\n        )\n";
-  const double samples = 2.0 * static_cast<double>(take.instant_count());
-  double done = 0;
-  WriteSamples(take, "point3f[] positions", file, [&](std::size_t s) {
-    std::vector<Vec3> positions;
-    for (std::size_t c = 0; c < n; ++c) positions.push_back(WorldFromShape(take, s, c).translation);
-    base::Report(progress, ++done / samples);
-    return Triples(positions);
-  });
-  WriteSamples(take, "quath[] orientations", file, [&](std::size_t s) {
-    base::Report(progress, ++done / samples);
-    return List(n, [&](std::size_t c, auto& out) {
-      const geometry::Quat q = take.Pose(s, c).rotation;
-      fmt::format_to(out, "({:.5g}, {:.5g}, {:.5g}, {:.5g})", q.w(), q.x(), q.y(), q.z());
-    });
-  });
-  if (!take.scale.empty()) {
-    WriteSamples(take, "float3[] scales", file, [&](std::size_t s) {
-      return List(n, [&](std::size_t c, auto& out) { fmt::format_to(out, "({0:.4g}, {0:.4g}, {0:.4g})", take.Size(s, c)); });
-    });
-  }
-  WriteSamples(take, "int64[] invisibleIds", file, [&](std::size_t s) {
-    std::vector<std::size_t> gone;
-    for (std::size_t c = 0; c < n; ++c) {
-      if (take.State(s, c) == geometry::CellState::kGone) gone.push_back(c);
-    }
-    return Numbers<std::size_t>(gone);
-  });
-  file << "        rel prototypes = " << List(n, [](std::size_t i, auto& out) { fmt::format_to(out, "</Take/Cells/Prototypes/cell_{:05d}>", i); })
-       << "\n";
+       << Material("skin", "(0.80, 0.62, 0.48)") << Material("cut", "(0.45, 0.12, 0.08)") << Material("object", "(0.50, 0.50, 0.52)")
+       << Material("turning", "(0.80, 0.62, 0.48)") << "    }\n";
+  file << "    def PointInstancer \"Cells\"\n    {\n";
+  WriteInstances(take, all.first(n), file);
+  WriteInstanceSamples(take, all.first(n), WholeTake(take), !take.scale.empty(), file, progress);
   file << "        def Scope \"Prototypes\"\n        {\n";
-  for (std::size_t c = 0; c < n; ++c) file << Prototype(take, c);
+  for (std::size_t c = 0; c < n; ++c) file << Prototype(shapes[c], c);
   file << "        }\n    }\n";
+  for (std::size_t i = n; i < pieces.size();) {
+    std::size_t end = i + 1;
+    if (pieces[i].copy >= 0) {
+      while (end < pieces.size() && pieces[end].copy == pieces[i].copy) ++end;
+      WriteCopy(take, all.subspan(i, end - i), file);
+    } else {
+      WritePair(take, pieces[i], shapes[pieces[i].shape], file);
+    }
+    i = end;
+  }
   for (std::size_t object = 0; object < take.objects.size(); ++object) file << Object(take, object);
   file << "}\n";
   file.close();

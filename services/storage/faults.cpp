@@ -228,6 +228,13 @@ std::string FaultIn(const geometry::SimulatedTake& take) {
                    "/copies/offset", "does not ascend from 0 to the number of rows");
     finder.Each(copies.cell, "/copies/cell", "is no cell", [cells](std::int32_t cell) { return cell >= 0 && cell < cells; });
     finder.Size(copies.copy.size(), rows, "/copies/copy");
+    for (std::size_t s = 0; s < steps && !finder.found(); ++s) {
+      for (auto i = copies.offset[s] + 1; i < copies.offset[s + 1]; ++i) {
+        const auto row = static_cast<std::size_t>(i);
+        finder.Require(std::pair(copies.copy[row - 1], copies.cell[row - 1]) < std::pair(copies.copy[row], copies.cell[row]), "/copies/copy",
+                       "is not in the order of copies and then of cells at every instant");
+      }
+    }
     finder.Size(copies.rotation.size(), rows, "/copies/rotation");
     finder.Each(copies.rotation, "/copies/rotation", "is no unit quaternion",
                 [](const Eigen::Vector4f& q) { return q.allFinite() && std::abs(q.norm() - 1) < 1e-3F; });

@@ -150,6 +150,66 @@ TEST(Hdf5Artifacts, ASimulatedTakeComesBackAsItWas) {
   EXPECT_TRUE(ReadSimulatedTake(folder / "bare.h5")->objects.empty());
 }
 
+TEST(Hdf5Artifacts, ScalesCopiesAndMorphsComeBackAsTheyWere) {
+  const TemporaryFolder folder;
+  const SimulatedTake take = TwoCubesWithCopiesAndPairs();
+  ASSERT_EQ(WriteSimulatedTake(folder / "simulated.h5", take, SomeProvenance()), absl::OkStatus());
+  EXPECT_EQ(CheckArtifact(folder / "simulated.h5"), absl::OkStatus());
+  const absl::StatusOr<SimulatedTake> read = ReadSimulatedTake(folder / "simulated.h5");
+  ASSERT_TRUE(read.ok()) << read.status();
+  EXPECT_EQ(read->cell_scale, take.cell_scale);
+  EXPECT_EQ(read->copies.offset, take.copies.offset);
+  EXPECT_EQ(read->copies.copy, take.copies.copy);
+  EXPECT_EQ(read->copies.cell, take.copies.cell);
+  EXPECT_EQ(read->copies.rotation, take.copies.rotation);
+  EXPECT_EQ(read->copies.translation, take.copies.translation);
+  EXPECT_EQ(read->copies.scale, take.copies.scale);
+  EXPECT_EQ(read->morph.source, take.morph.source);
+  EXPECT_EQ(read->morph.target, take.morph.target);
+  EXPECT_EQ(read->morph.vertex_offset, take.morph.vertex_offset);
+  EXPECT_EQ(read->morph.from, take.morph.from);
+  EXPECT_EQ(read->morph.to, take.morph.to);
+  EXPECT_EQ(read->morph.triangle_offset, take.morph.triangle_offset);
+  EXPECT_EQ(read->morph.triangles, take.morph.triangles);
+  EXPECT_EQ(read->morph.blend, take.morph.blend);
+  EXPECT_EQ(read->morph.scale, take.morph.scale);
+  EXPECT_EQ(read->morph.rotation, take.morph.rotation);
+  EXPECT_EQ(read->morph.translation, take.morph.translation);
+
+  // Without them, they are not there rather than empty.
+  ASSERT_EQ(WriteSimulatedTake(folder / "plain.h5", TwoCubesAndABall(), SomeProvenance()), absl::OkStatus());
+  const SimulatedTake plain = ReadSimulatedTake(folder / "plain.h5").value();
+  EXPECT_TRUE(plain.cell_scale.empty() && plain.copies.offset.empty() && plain.morph.vertex_offset.empty());
+}
+
+TEST(Hdf5Artifacts, NoScalesCopiesOrMorphsAreWrittenThatCouldNotBe) {
+  const TemporaryFolder folder;
+  const auto refused = [&](auto spoil) {
+    SimulatedTake take = TwoCubesWithCopiesAndPairs();
+    spoil(take);
+    return std::string(WriteSimulatedTake(folder / "bad.h5", take, SomeProvenance()).message());
+  };
+  EXPECT_THAT(refused([](SimulatedTake& t) { t.cell_scale[2] = 1.5F; }), HasSubstr("/cells/scale: entry 2 is not within 0 and 1"));
+  EXPECT_THAT(refused([](SimulatedTake& t) { t.copies.cell[1] = 2; }), HasSubstr("/copies/cell: entry 1 is no cell"));
+  EXPECT_THAT(refused([](SimulatedTake& t) { t.copies.offset[1] = 4; }), HasSubstr("/copies/offset"));
+  EXPECT_THAT(refused([](SimulatedTake& t) { std::swap(t.copies.copy[0], t.copies.copy[2]); }), HasSubstr("/copies/copy: is not in the order"));
+  EXPECT_THAT(refused([](SimulatedTake& t) { t.copies.cell[1] = 0; }), HasSubstr("/copies/copy: is not in the order"));  // one cell twice
+  EXPECT_THAT(refused([](SimulatedTake& t) { t.morph.triangles[5][2] = 4; }), HasSubstr("/morph/triangles: has an index out of range"));
+  EXPECT_THAT(refused([](SimulatedTake& t) { t.morph.blend.pop_back(); }), HasSubstr("/morph/blend: has 3 entries, not 4"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "bad.h5"));
+}
+
+TEST(Hdf5Artifacts, AnEffectOfTheLargestSizeThatJobsTakeComesBack) {
+  const TemporaryFolder folder;
+  SimulatedTake take = TwoCubesAndABall();
+  take.effect_json = R"({"note":")" + std::string(1 << 20, 'x') + R"("})";  // sixteen times what HDF5 holds in an object's own header
+  ASSERT_EQ(WriteSimulatedTake(folder / "simulated.h5", take, SomeProvenance()), absl::OkStatus());
+  const absl::StatusOr<SimulatedTake> read = ReadSimulatedTake(folder / "simulated.h5");
+  ASSERT_TRUE(read.ok()) << read.status();
+  EXPECT_EQ(read->effect_json, take.effect_json);
+  EXPECT_EQ(CheckArtifact(folder / "simulated.h5"), absl::OkStatus());
+}
+
 TEST(Hdf5Artifacts, ProvenanceOfAnySizeComesBack) {
   const TemporaryFolder folder;
   Provenance provenance = SomeProvenance();

@@ -86,6 +86,31 @@ inline geometry::SimulatedTake TwoCubesAndABall() {
   return take;
 }
 
+/// The same with cells that shrink, copies at the second instant only, and a morph of two pairs, one of which grows from nothing.
+inline geometry::SimulatedTake TwoCubesWithCopiesAndPairs() {
+  geometry::SimulatedTake take = TwoCubesAndABall();
+  take.cell_scale = {1, 0.75F, 0.5F, 0.25F};
+  take.copies = {.offset = {0, 0, 3}, .copy = {0, 0, 2}, .cell = {0, 1, 1}, .scale = {1, 0.5F, 0.125F}};
+  for (int row = 0; row < 3; ++row) {
+    take.copies.rotation.push_back(Eigen::Vector4f(1, 0.5f * static_cast<float>(row), 0, -0.5f).normalized());
+    take.copies.translation.emplace_back(static_cast<float>(row), -1.f, 0.5f * static_cast<float>(row));
+  }
+  take.morph.source = {1, -1};
+  take.morph.target = {5, 0};
+  take.morph.vertex_offset = {0, 4, 8};
+  take.morph.from = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0, 0, 0}, {0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
+  take.morph.to = {{-1, -1, -1}, {1, -1, -1}, {-1, 1, -1}, {-1, -1, 1}, {0, 0, 0}, {1, 0, 0}, {0, 2, 0}, {0, 0, 3}};
+  take.morph.triangle_offset = {0, 4, 7};
+  take.morph.triangles = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}, {0, 2, 1}, {0, 1, 3}, {1, 2, 3}};
+  take.morph.blend = {0.25F, 0, 1, 0.5F};
+  take.morph.scale = {0.875F, 1, 1, 1.125F};
+  for (int i = 0; i < 4; ++i) {
+    take.morph.rotation.push_back(Eigen::Vector4f(1, 0, 0.25f * static_cast<float>(i), -1).normalized());
+    take.morph.translation.emplace_back(4.f, static_cast<float>(i), -2.f);
+  }
+  return take;
+}
+
 inline Provenance SomeProvenance() {
   return {"tessellate", std::string(64, 'a'), 3, R"({"cells":3,"up":"+y"})", 18446744073709551615ULL, {"frame:" + std::string(64, 'b'), "cells:-"}};
 }

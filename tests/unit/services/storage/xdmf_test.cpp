@@ -76,6 +76,40 @@ TEST(Xdmf, ShowsStatesOfASimulation) {
   EXPECT_EQ(moved.Dataset<std::uint8_t>("/state/000001", {3}).value(), (std::vector<std::uint8_t>{1, 2, 1}));
 }
 
+TEST(Xdmf, CopiesAndPairsAreCollectionsOfTheirOwn) {
+  const TemporaryFolder folder;
+  geometry::TrackedTake take = ThreeCubesTracked();
+  ASSERT_EQ(WriteTrackedTake(folder / "tracked.h5", take, SomeProvenance()), absl::OkStatus());
+  geometry::SimulatedTake simulated = TwoCubesWithCopiesAndPairs();
+  simulated.cell_rotation.assign(6, {1, 0, 0, 0});
+  simulated.cell_translation.assign(6, geometry::Vec3::Zero());
+  simulated.cell_state.assign(6, geometry::CellState::kReleased);
+  simulated.cell_scale = {1, 1, 1, 0.5F, 0.25F, 0.125F};
+  // Copy row 2, cell 1: a quarter turn about z takes its centroid (1.5, 0.5, 0.5) to (-0.5, 1.5, 0.5), and then it moves by (2, -1, 1).
+  const float half = static_cast<float>(std::sqrt(0.5));
+  simulated.copies.rotation[2] = {half, 0, 0, half};
+  ASSERT_EQ(WriteSimulatedTake(folder / "simulated.h5", simulated, SomeProvenance()), absl::OkStatus());
+  ASSERT_EQ(WriteXdmf(folder / "simulated.h5", folder / "tracked.h5", folder / "simulated.xdmf"), absl::OkStatus());
+  const std::string text = Text(folder / "simulated.xdmf");
+  EXPECT_EQ(Count(text, "<Grid Name=\"cells\""), 2u);
+  EXPECT_EQ(Count(text, "<Grid Name=\"copies\" GridType=\"Uniform\""), 1u);  // at the second instant only
+  EXPECT_EQ(Count(text, "<Grid Name=\"pairs\" GridType=\"Uniform\""), 2u);
+  EXPECT_EQ(Count(text, "CollectionType=\"Temporal\""), 3u);
+  const Hdf5Reader moved = Hdf5Reader::Open(folder / "simulated.xdmf.h5").value();
+  EXPECT_EQ(moved.Dataset<float>("/scale/000001", {3}).value(), (std::vector<float>{0.5F, 0.25F, 0.125F}));
+  EXPECT_EQ(moved.Dataset<std::int32_t>("/copies_copy/000001", {3}).value(), (std::vector<std::int32_t>{0, 0, 2}));
+  EXPECT_EQ(moved.Dataset<float>("/copies_scale/000001", {3}).value(), (std::vector<float>{1, 0.5F, 0.125F}));
+  const std::vector<float> copies = moved.Dataset<float>("/copies_position/000001", {3, 3}).value();
+  EXPECT_NEAR(copies[6], 1.5, 1e-6);
+  EXPECT_NEAR(copies[7], 0.5, 1e-6);
+  EXPECT_NEAR(copies[8], 1.5, 1e-6);
+  EXPECT_FALSE(moved.Has("/copies_copy/000000"));
+  EXPECT_EQ(moved.Dataset<std::int32_t>("/pairs_source/000000", {1}).value(), (std::vector<std::int32_t>{1}));
+  EXPECT_EQ(moved.Dataset<std::int32_t>("/pairs_target/000001", {2}).value(), (std::vector<std::int32_t>{5, 0}));
+  EXPECT_EQ(moved.Dataset<float>("/pairs_blend/000001", {2}).value(), (std::vector<float>{1, 0.5F}));
+  EXPECT_EQ(moved.Dataset<float>("/pairs_position/000001", {2, 3}).value(), (std::vector<float>{4, 2, -2, 4, 3, -2}));
+}
+
 TEST(Xdmf, RefusesWhatHasNoCells) {
   const TemporaryFolder folder;
   ASSERT_EQ(WritePoseTrack(folder / "guide.h5", TwoPatchesThreeFrames(), SomeProvenance()), absl::OkStatus());
