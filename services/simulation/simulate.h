@@ -1,18 +1,14 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
-#include <functional>
-
 #include <nlohmann/json.hpp>
 
 #include "services/base/progress.h"
 #include "services/base/status.h"
 #include "services/geometry/simulated_take.h"
+#include "services/simulation/effect_run.h"
 
 namespace vorocast::simulation {
-
-/// Asked at every stored frame; true ends the run with CANCELLED.
-using Cancelled = std::function<bool()>;
 
 /// Runs one effect on a tracked take, start to end (paper, section 5): each cell a convex rigid body in Bullet, recalled to its tracked
 /// pose by a damped spring, gravity, contacts, scene objects, rupture. The same input gives the same result on every run.

@@ -47,8 +47,8 @@ SimulationRun::SimulationRun(const Effect& effect, const TrackedMotion& motion, 
       schedule_(ScheduleRelease(motion, subject_, effect.release, Duration(effect, motion))),
       recall_weight_(MaskWeights(effect.recall.mask, subject_)),
       rupture_weight_(MaskWeights(effect.rupture.mask, subject_)),
-      fields_(effect.fields, subject_, scene.take_origin),
-      distortion_(effect.distortion, subject_, scene.take_origin),
+      fields_(std::in_place, effect.fields, subject_, scene.take_origin),
+      distortion_(std::in_place, effect.distortion, subject_, scene.take_origin),
       bonds_(effect.bonds, motion.model().cells, subject_),
       vanishes_(std::ranges::any_of(schedule_.vanish, [](double time) { return std::isfinite(time); })),
       previous_dt_(first_dt),
@@ -56,8 +56,8 @@ SimulationRun::SimulationRun(const Effect& effect, const TrackedMotion& motion, 
       world_(effect.gravity_m_s2.At(0), scene.ground_height, effect.ground.surface) {
   motion.Sample(0, target_);
   motion.Sample(first_dt, next_target_);
-  distortion_.Apply(0, target_);
-  distortion_.Apply(first_dt, next_target_);
+  distortion_->Apply(0, target_);
+  distortion_->Apply(first_dt, next_target_);
   // What the velocities at the start are compared with: the take's own motion, run on backwards.
   previous_target_.resize(target_.size());
   cells_.resize(target_.size());
@@ -75,10 +75,31 @@ SimulationRun::SimulationRun(const Effect& effect, const TrackedMotion& motion, 
   world_.LetPartnersOverlap(&bonds_.partners());
 }
 
+void SimulationRun::EffectChanged(bool distortion) {
+  schedule_ = ScheduleRelease(motion_, subject_, effect_.release, Duration(effect_, motion_));
+  vanishes_ = std::ranges::any_of(schedule_.vanish, [](double time) { return std::isfinite(time); });
+  recall_weight_ = MaskWeights(effect_.recall.mask, subject_);
+  rupture_weight_ = MaskWeights(effect_.rupture.mask, subject_);
+  fields_.emplace(effect_.fields, subject_, scene_.take_origin);
+  // What slept under the old fields and springs feels the new ones.
+  for (Cell& cell : cells_) cell.asleep_push = -1;
+  if (distortion) {
+    for (std::size_t c = 0; c < cells_.size(); ++c) {
+      if (cells_[c].state == CellState::kRecalled) Disturb(c);
+    }
+  }
+  distortion_.emplace(effect_.distortion, subject_, scene_.take_origin);
+  if (!distortion) return;
+  motion_.Sample(time_ - previous_dt_, previous_target_);
+  distortion_->Apply(time_ - previous_dt_, previous_target_);
+  motion_.Sample(time_, target_);
+  distortion_->Apply(time_, target_);
+}
+
 absl::Status SimulationRun::Step(double dt) {
   SetKeyFrames();
   motion_.Sample(time_ + dt, next_target_);
-  distortion_.Apply(time_ + dt, next_target_);
+  distortion_->Apply(time_ + dt, next_target_);
   ReleaseDueCells();
   BlowOnReleasedCells(dt);
   FindWhatMayCollide(dt);
@@ -110,7 +131,7 @@ void SimulationRun::SetKeyFrames() {
   world_.SetGravity(gravity_);
   const auto& rupture = effect_.rupture.acceleration_m_s2;
   rupture_m_s2_ = rupture ? rupture->At(time_) : std::numeric_limits<double>::infinity();
-  fields_.Advance(time_);
+  fields_->Advance(time_);
 }
 
 /// A mask weakens a cell's spring; its damping ratio stays.
@@ -153,11 +174,11 @@ void SimulationRun::ReleaseDueCells() {
 
 /// Fields reach released cells as a change of velocity. What lies still on the ground or in a pile sleeps on until they change.
 void SimulationRun::BlowOnReleasedCells(double dt) {
-  if (fields_.empty()) return;
+  if (fields_->empty()) return;
   for (std::size_t c = 0; c < cells_.size(); ++c) {
     Cell& cell = cells_[c];
     if (cell.state != CellState::kReleased) continue;
-    const FieldPush push = fields_.At(c, cell.body.position, false);
+    const FieldPush push = fields_->At(c, cell.body.position, false);
     const double strength = push.acceleration.norm();
     if (world_.Sleeps(c) && std::abs(strength - cell.asleep_push) < kWakingPush) continue;
     cell.asleep_push = strength;
@@ -169,8 +190,8 @@ void SimulationRun::BlowOnReleasedCells(double dt) {
 }
 
 Vec3 SimulationRun::PushOnRecalled(std::size_t c) const {
-  if (fields_.empty()) return weight_left_;
-  const FieldPush push = fields_.At(c, cells_[c].body.position, true);
+  if (fields_->empty()) return weight_left_;
+  const FieldPush push = fields_->At(c, cells_[c].body.position, true);
   const Vec3 velocity = cells_[c].disturbed ? cells_[c].body.velocity : TargetVelocity(c);
   return weight_left_ + push.acceleration - push.drag * velocity;
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "services/geometry/simulated_take.h"
@@ -33,6 +34,9 @@ class SimulationRun {
 
   /// From time() to time() + dt. INTERNAL, with the cell, when a body's state is no longer finite.
   absl::Status Step(double dt);
+  /// To be called after the effect was changed in its place: from the next step on it holds. Cells that were let go stay so. What the scene is built
+  /// of and which cells hold each other must be as before. `distortion`: whether that differs; cells then go to their new places by their springs.
+  void EffectChanged(bool distortion);
   double time() const { return time_; }
   /// The fastest speed of anything that is not recalled, metres a second.
   double FastestForeign() const;
@@ -78,14 +82,14 @@ class SimulationRun {
   const Scene& scene_;
   const std::vector<CellShape>& shapes_;
   const MaskSubject subject_;
-  const ReleaseSchedule schedule_;
-  const std::vector<double> recall_weight_;
-  const std::vector<double> rupture_weight_;
-  ForceFields fields_;
-  const Distortion distortion_;
+  ReleaseSchedule schedule_;
+  std::vector<double> recall_weight_;
+  std::vector<double> rupture_weight_;
+  std::optional<ForceFields> fields_;     // never empty; they refer to the effect, and are made anew when it changes
+  std::optional<Distortion> distortion_;  // likewise
   Bonds bonds_;
   std::vector<Bonds::Body> bond_bodies_;  // of the step at hand; a member only to keep its memory
-  const bool vanishes_;                   // whether any cell ever does
+  bool vanishes_;                         // whether any cell ever does
   geometry::Vec3 middle_;                 // of the first frame: cells too far from it are gone
 
   // What key frames say for the step at hand.
