@@ -36,6 +36,7 @@ const std::map<std::string_view, Access>& Table() {
       {"/vorocast.v1.Simulation/Effects", {.least = Role::kRead}},
       {"/vorocast.v1.Simulation/Check", {.least = Role::kRead}},
       {"/vorocast.v1.Simulation/Run", {.least = Role::kSubmit}},
+      {"/vorocast.v1.Simulation/Live", {.least = Role::kSubmit}},
       {"/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo", {.least = Role::kRead}},
       {"/grpc.health.v1.Health/Check", {.anybody = true}},
       {"/grpc.health.v1.Health/Watch", {.anybody = true}},

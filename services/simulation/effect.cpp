@@ -13,6 +13,7 @@
 #include "services/simulation/json_schema.h"
 #include "services/simulation/mesh_file.h"
 #include "services/simulation/shipped_effects.h"
+#include "services/tasks/field_table.h"
 
 namespace vorocast::simulation {
 namespace {
@@ -20,6 +21,7 @@ namespace {
 using nlohmann::json;
 
 constexpr std::uintmax_t kLargestFile = 2 << 20;  // with the meshes that it carries
+constexpr int kDeepest = 32;                      // what the schema describes is nested far less
 
 absl::StatusOr<std::string> ReadText(const std::filesystem::path& path) {
   std::error_code error;
@@ -31,16 +33,6 @@ absl::StatusOr<std::string> ReadText(const std::filesystem::path& path) {
   std::string text{std::istreambuf_iterator<char>(file), {}};
   if (!file) return absl::UnavailableError(fmt::format("effect file {}: cannot be read", path.string()));
   return text;
-}
-
-absl::StatusOr<json> ParseJson(std::string_view text) {
-  if (text.size() > kLargestFile)
-    return absl::InvalidArgumentError(fmt::format("effect: {} bytes, an effect has at most {}", text.size(), kLargestFile));
-  try {
-    return json::parse(text);
-  } catch (const json::exception& error) {
-    return absl::InvalidArgumentError(fmt::format("effect: not valid JSON: {}", error.what()));
-  }
 }
 
 absl::StatusOr<json> ParseEffectFile(std::string_view text, const std::filesystem::path& path) {
@@ -62,6 +54,19 @@ absl::StatusOr<json> NormaliseEffect(const json& effect) {
   ASSIGN_OR_RETURN(json canonical, Canonicalise(schema, effect, "effect"));
   RETURN_IF_ERROR(EffectFromCanonicalJson(canonical).status());
   return canonical;
+}
+
+absl::StatusOr<json> ParseJson(std::string_view text) {
+  if (text.size() > kLargestFile)
+    return absl::InvalidArgumentError(fmt::format("effect: {} bytes, an effect has at most {}", text.size(), kLargestFile));
+  try {
+    json value = json::parse(text);
+    // Copying and printing a value take as much stack as it is deep.
+    if (!tasks::NestsWithin(value, kDeepest)) return absl::InvalidArgumentError(fmt::format("effect: it nests more than {} deep", kDeepest));
+    return value;
+  } catch (const json::exception& error) {
+    return absl::InvalidArgumentError(fmt::format("effect: not valid JSON: {}", error.what()));
+  }
 }
 
 absl::StatusOr<json> ParseEffect(std::string_view text) {

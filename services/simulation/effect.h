@@ -24,6 +24,9 @@ absl::StatusOr<nlohmann::json> NormaliseEffect(const nlohmann::json& effect);
 /// The same for JSON text, as it comes over a wire.
 absl::StatusOr<nlohmann::json> ParseEffect(std::string_view text);
 
+/// JSON text from outside, of any kind. INVALID_ARGUMENT when it is too long, too deeply nested, or no JSON.
+absl::StatusOr<nlohmann::json> ParseJson(std::string_view text);
+
 /// Whether the effect (canonical, or null for none) and the number of takes fit each other: a morph needs a second take, and nothing else has a use
 /// for one. INVALID_ARGUMENT says what to do.
 absl::Status CheckSecondTake(const nlohmann::json& canonical_effect, bool has_second_take);

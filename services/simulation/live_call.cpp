@@ -5,9 +5,9 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cstring>
 #include <ctime>
 #include <exception>
+#include <system_error>
 #include <thread>
 
 #include <grpcpp/server_context.h>
@@ -20,8 +20,8 @@ namespace vorocast::simulation {
 namespace {
 
 constexpr std::size_t kRequestsMax = 64;
+constexpr std::size_t kWaitingBytesMax = 4 << 20;
 constexpr std::int64_t kAhead = 4;
-constexpr std::size_t kValueBytesMax = 2 << 20;
 
 double ThreadSeconds() {
   timespec now{};
@@ -42,7 +42,13 @@ LiveCall* LiveCall::Start(LiveSessions& sessions, grpc::CallbackServerContext* c
     return call.get();
   }
   call->StartRead(&call->reading_);
-  std::thread([call] { call->Run(); }).detach();
+  try {
+    std::thread([call] { call->Run(); }).detach();
+  } catch (const std::system_error& error) {
+    sessions.Leaving();
+    sessions.Left();
+    call->Finish(rpc::ToGrpc(absl::ResourceExhaustedError(fmt::format("no thread for the session: {}; try again later", error.what()))));
+  }
   return call.get();
 }
 
@@ -56,9 +62,12 @@ void LiveCall::OnReadDone(bool ok) {
   ++heard_;
   // Nobody has received more than was sent.
   received_ = std::clamp(reading_.received(), received_, std::max(received_, sent_));
-  if (reading_.what_case() != v1::LiveRequest::WHAT_NOT_SET) requests_.push_back(std::move(reading_));
+  if (reading_.what_case() != v1::LiveRequest::WHAT_NOT_SET) {
+    waiting_bytes_ += reading_.ByteSizeLong();
+    requests_.push_back(std::move(reading_));
+  }
   changed_.notify_all();
-  read_waits_ = requests_.size() >= kRequestsMax;
+  read_waits_ = requests_.size() >= kRequestsMax || waiting_bytes_ >= kWaitingBytesMax;
   if (!read_waits_) StartRead(&reading_);
 }
 
@@ -86,10 +95,12 @@ void LiveCall::Run() {
   take_.reset();
   {
     std::unique_lock lock(mutex_);
-    if (writing_) {
-      // A client that takes nothing any more would keep the last message, and with it this thread, for ever.
-      if (absl::IsDeadlineExceeded(status)) context_->TryCancel();
-      changed_.wait(lock, [this] { return !writing_; });
+    const auto written = [this] { return !writing_; };
+    // A client that takes nothing any more would keep the last message, and with it this thread, for ever.
+    const absl::Duration patience = absl::IsDeadlineExceeded(status) ? absl::ZeroDuration() : sessions_.options_.idle_max;
+    if (!changed_.wait_for(lock, absl::ToChronoNanoseconds(patience), written)) {
+      context_->TryCancel();
+      changed_.wait(lock, written);
     }
   }
   // A client that has ended its requests, or gone, has all it wanted.
@@ -133,6 +144,7 @@ absl::StatusOr<std::optional<v1::LiveRequest>> LiveCall::Next() {
   if (requests_.empty()) return std::optional<v1::LiveRequest>();
   v1::LiveRequest request = std::move(requests_.front());
   requests_.pop_front();
+  waiting_bytes_ -= request.ByteSizeLong();
   if (read_waits_) {
     read_waits_ = false;
     StartRead(&reading_);
@@ -159,6 +171,10 @@ absl::Status LiveCall::Open(const v1::LiveRequest& request) {
   ASSIGN_OR_RETURN(take_, sessions_.options_.open_take(request.open().tracked_key()));
   ASSIGN_OR_RETURN(live_, LiveRun::Open(*take_, effect));
   ++answered_;
+  return SendScene();
+}
+
+absl::Status LiveCall::SendScene() {
   v1::LiveFrame frame;
   v1::LiveScene& scene = *frame.mutable_scene();
   scene.set_cells(static_cast<std::int32_t>(take_->cell_count()));
@@ -166,8 +182,8 @@ absl::Status LiveCall::Open(const v1::LiveRequest& request) {
   scene.set_frames_per_second(1 / live_->run().frame_time());
   for (const SceneBody& body : live_->run().scene().bodies) scene.add_objects(body.name);
   scene.set_effect_json(live_->effect().dump());
-  RETURN_IF_ERROR(Send(std::move(frame)));
-  return SendInstant(0, 0);
+  Fill(*scene.mutable_instant());
+  return Send(std::move(frame));
 }
 
 absl::Status LiveCall::Refuse(const absl::Status& why) {
@@ -187,11 +203,10 @@ absl::Status LiveCall::Answer(const v1::LiveRequest& request) {
       to_play_ = 0;
       return Send({});
     case v1::LiveRequest::kChange: {
-      const std::string& text = request.change().value_json();
-      if (text.size() > kValueBytesMax) return Refuse(absl::InvalidArgumentError(fmt::format("value_json has more than {} bytes", kValueBytesMax)));
-      const auto value = nlohmann::json::parse(text, nullptr, false);
-      if (value.is_discarded()) return Refuse(absl::InvalidArgumentError("value_json is not JSON"));
-      if (const absl::Status status = live_->Change(request.change().path(), value); !status.ok()) return Refuse(status);
+      const auto value = ParseJson(request.change().value_json());
+      if (!value.ok()) return Refuse(base::Annotate(value.status(), "value_json"));
+      if (const absl::Status status = live_->Change(request.change().path(), *value); !status.ok()) return Refuse(status);
+      if (live_->frame() == 0) return SendScene();
       v1::LiveFrame frame;
       frame.set_effect_json(live_->effect().dump());
       return Send(std::move(frame));
@@ -219,15 +234,19 @@ absl::Status LiveCall::PlayOne() {
 }
 
 absl::Status LiveCall::SendInstant(int steps, double seconds) {
-  geometry::SimulatedTake now;
-  live_->run().Record(now);
   v1::LiveFrame frame;
   v1::LiveInstant& instant = *frame.mutable_instant();
-  Pack(now, instant);
+  Fill(instant);
   instant.set_steps(steps);
   instant.set_step_seconds(seconds / std::max(1, steps));
-  instant.set_frames(static_cast<std::int32_t>(live_->run().instants()));
   return Send(std::move(frame));
+}
+
+void LiveCall::Fill(v1::LiveInstant& instant) const {
+  geometry::SimulatedTake now;
+  live_->run().Record(now);
+  Pack(now, instant);
+  instant.set_frames(static_cast<std::int32_t>(live_->run().instants()));
 }
 
 }  // namespace vorocast::simulation

@@ -35,7 +35,9 @@ class LiveCall final : public grpc::ServerBidiReactor<v1::LiveRequest, v1::LiveF
   absl::Status Open(const v1::LiveRequest& request);
   absl::Status Answer(const v1::LiveRequest& request);
   absl::Status PlayOne();
+  absl::Status SendScene();
   absl::Status SendInstant(int steps, double seconds);
+  void Fill(v1::LiveInstant& instant) const;
   absl::Status Refuse(const absl::Status& why);
   /// Waits until the message before is written. CANCELLED when the client has gone, DEADLINE_EXCEEDED when it has stopped taking anything.
   absl::Status Send(v1::LiveFrame frame);
@@ -52,6 +54,7 @@ class LiveCall final : public grpc::ServerBidiReactor<v1::LiveRequest, v1::LiveF
   std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<v1::LiveRequest> requests_;  // guarded by mutex_, as what follows
+  std::size_t waiting_bytes_ = 0;         // of them
   bool read_waits_ = false;               // the queue is full
   bool writing_ = false;
   std::int64_t sent_ = 0;

@@ -81,4 +81,15 @@ absl::Status Unpack(const v1::LiveInstant& instant, std::size_t cells, std::size
   return absl::OkStatus();
 }
 
+void Truncate(std::size_t instants, std::size_t cells, std::size_t objects, geometry::SimulatedTake& take) {
+  if (instants >= take.time.size()) return;
+  const auto shorten = [](auto& values, std::size_t size) { values.erase(values.begin() + static_cast<std::ptrdiff_t>(size), values.end()); };
+  shorten(take.time, instants);
+  shorten(take.cell_rotation, instants * cells);
+  shorten(take.cell_translation, instants * cells);
+  shorten(take.cell_state, instants * cells);
+  if (!take.cell_scale.empty()) shorten(take.cell_scale, instants * cells);
+  shorten(take.object_pose, instants * objects);
+}
+
 }  // namespace vorocast::simulation

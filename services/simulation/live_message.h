@@ -11,5 +11,7 @@ namespace vorocast::simulation {
 void Pack(const geometry::SimulatedTake& now, v1::LiveInstant& instant);
 /// Appends the instant to a take of so many cells and objects. DATA_LOSS when the arrays do not fit them.
 absl::Status Unpack(const v1::LiveInstant& instant, std::size_t cells, std::size_t objects, geometry::SimulatedTake& take);
+/// Keeps the first `instants` only.
+void Truncate(std::size_t instants, std::size_t cells, std::size_t objects, geometry::SimulatedTake& take);
 
 }  // namespace vorocast::simulation

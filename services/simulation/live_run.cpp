@@ -37,6 +37,23 @@ nlohmann::json* Find(nlohmann::json& json, const std::string& name) {
   return nullptr;
 }
 
+absl::StatusOr<nlohmann::json*> Locate(nlohmann::json& effect, const std::string& path) {
+  if (path.size() > kPathMax) return absl::InvalidArgumentError(fmt::format("a path has at most {} characters", kPathMax));
+  std::vector<std::string> names = Split(path);
+  if (!effect.contains(names.front()) && effect.contains("objects") && Find(effect["objects"], names.front()) != nullptr) {
+    names.insert(names.begin(), "objects");
+  }
+  nlohmann::json* at = &effect;
+  for (const std::string& name : names) {
+    at = Find(*at, name);
+    if (at == nullptr) {
+      return absl::InvalidArgumentError(
+          fmt::format("the effect has no field \"{}\": there is no \"{}\"; docs/effects.md lists the fields of each part", path, name));
+    }
+  }
+  return at;
+}
+
 absl::Status CheckLive(const nlohmann::json& canonical) {
   if (canonical.at("morph").is_object()) {
     return absl::InvalidArgumentError(
@@ -48,22 +65,16 @@ absl::Status CheckLive(const nlohmann::json& canonical) {
 }  // namespace
 
 absl::StatusOr<nlohmann::json> WithField(const nlohmann::json& effect, const std::string& path, const nlohmann::json& value) {
-  if (path.size() > kPathMax) return absl::InvalidArgumentError(fmt::format("a path has at most {} characters", kPathMax));
   nlohmann::json changed = effect;
-  std::vector<std::string> names = Split(path);
-  if (!changed.contains(names.front()) && changed.contains("objects") && Find(changed["objects"], names.front()) != nullptr) {
-    names.insert(names.begin(), "objects");
-  }
-  nlohmann::json* at = &changed;
-  for (const std::string& name : names) {
-    at = Find(*at, name);
-    if (at == nullptr) {
-      return absl::InvalidArgumentError(
-          fmt::format("the effect has no field \"{}\": there is no \"{}\"; docs/effects.md lists the fields of each part", path, name));
-    }
-  }
+  ASSIGN_OR_RETURN(nlohmann::json * at, Locate(changed, path));
   *at = value;
   return changed;
+}
+
+absl::StatusOr<nlohmann::json> FieldOf(const nlohmann::json& effect, const std::string& path) {
+  nlohmann::json copy = effect;
+  ASSIGN_OR_RETURN(const nlohmann::json* const at, Locate(copy, path));
+  return *at;
 }
 
 absl::StatusOr<std::unique_ptr<LiveRun>> LiveRun::Open(const geometry::TrackedTake& take, const nlohmann::json& effect) {

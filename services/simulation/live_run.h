@@ -57,4 +57,7 @@ class LiveRun {
 /// "objects.pendulum.mass_kg". INVALID_ARGUMENT when there is no such field. The value is not checked.
 absl::StatusOr<nlohmann::json> WithField(const nlohmann::json& effect, const std::string& path, const nlohmann::json& value);
 
+/// The field of that path. Errors likewise.
+absl::StatusOr<nlohmann::json> FieldOf(const nlohmann::json& effect, const std::string& path);
+
 }  // namespace vorocast::simulation

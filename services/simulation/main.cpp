@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 // vorocast-simulation: runs effects on tracked takes, as the last stage of the scheduler's jobs and through a gRPC door of its own.
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <future>
+#include <iostream>
 #include <memory>
 #include <string>
 #include <utility>
@@ -18,6 +21,7 @@
 #include "services/lease/lease_metrics.h"
 #include "services/rpc/security_flags.h"
 #include "services/rpc/server.h"
+#include "services/simulation/live_command.h"
 #include "services/simulation/simulate_executor.h"
 #include "services/simulation/simulation_service.h"
 #include "services/simulation/try_effect.h"
@@ -30,7 +34,7 @@ using namespace vorocast;
 constexpr char kStory[] =
     "Runs effects on tracked takes with rigid-body physics. With --scheduler it takes simulation tasks from a Vorocast scheduler;\n"
     "with --listen it answers its own gRPC service: which effects there are, whether an effect is right, and a run on any tracked\n"
-    "take in the artifact folder given by --store. Both at once are fine. SIGTERM or Ctrl-C lets it finish what runs and leave.";
+    "take in the artifact folder given by --store, at once or live. Both at once are fine. SIGTERM or Ctrl-C lets it finish what runs and leave.";
 
 struct Options {
   lease::LeaseLoopOptions lease;
@@ -38,6 +42,8 @@ struct Options {
   std::string listen;
   std::string store;
   rpc::ServerSecurity security;
+  std::int32_t live_max = 4;
+  double live_idle_s = 600;
 };
 
 /// Until SIGTERM or SIGINT.
@@ -60,8 +66,12 @@ absl::Status Serve(Options& options) {
   std::unique_ptr<rpc::Server> server;
   if (!options.listen.empty()) {
     ASSIGN_OR_RETURN(storage::ArtifactStore store, storage::ArtifactStore::Open(options.store));
-    service = std::make_unique<simulation::SimulationService>(
-        simulation::SimulationService::Options{.store = std::move(store), .program = options.lease.program, .runs_max = options.lease.slots});
+    service =
+        std::make_unique<simulation::SimulationService>(simulation::SimulationService::Options{.store = std::move(store),
+                                                                                               .program = options.lease.program,
+                                                                                               .runs_max = options.lease.slots,
+                                                                                               .live_max = options.live_max,
+                                                                                               .live_idle = absl::Seconds(options.live_idle_s)});
     const auto log = [](const std::string& text) { fmt::print(stderr, "vorocast-simulation: {}\n", text); };
     ASSIGN_OR_RETURN(const rpc::ServerGuard guard, rpc::OpenGuard(options.security, log));
     if (rpc::IsUnguarded(options.listen, guard)) {
@@ -94,6 +104,12 @@ int main(int argc, char** argv) {
   CLI::Option* store = app.add_option("--store", options.store, "The artifact folder for runs asked for over --listen");
   listen->needs(store);
   rpc::AddServerSecurityFlags(app, options.security);
+  app.add_option("--live-max", options.live_max, "Live sessions at once, over --listen; each may keep a processor busy")
+      ->check(CLI::Range(0, 1000))
+      ->capture_default_str();
+  app.add_option("--live-idle", options.live_idle_s, "Seconds after which a live session of which nothing is heard is ended")
+      ->check(CLI::Range(1.0, 1e6))
+      ->capture_default_str();
   lease::LeaseFlags flags;
   flags.AddTo(app, options.lease, "Simulations at once, from each side");
   options.telemetry.AddTo(app);
@@ -108,6 +124,13 @@ int main(int argc, char** argv) {
   try_effect->add_option("--pictures", trial.pictures, "On the sheet")->check(CLI::Range(1, 200))->capture_default_str();
   try_effect->add_option("--from", trial.from_s, "Time of the sheet's first picture, seconds")->capture_default_str();
   try_effect->add_option("--width", trial.width, "Of a picture, pixels")->check(CLI::Range(16, 4096))->capture_default_str();
+  CLI::App* live_command = app.add_subcommand("live", "Plays an effect on a tracked.h5 while its fields are changed: 'help' lists the commands");
+  simulation::LiveOptions live;
+  live_command->add_option("tracked", live.tracked, "The tracked take")->required()->check(CLI::ExistingFile);
+  live_command->add_option("--effect", live.effect, "A shipped effect's name or a JSON file (docs/effects.md)")->required();
+  live_command->add_option("--at", live.at, "A simulation service that has the take in its artifact folder: HOST:PORT or unix:/PATH (this program)");
+  rpc::ClientSecurityFlags live_security;
+  live_security.AddTo(*live_command);
   CLI11_PARSE(app, argc, argv);
 
   if (execute_task->parsed()) {
@@ -117,6 +140,13 @@ int main(int argc, char** argv) {
   }
   if (try_effect->parsed()) {
     const absl::Status status = simulation::TryEffect(trial);
+    if (!status.ok()) fmt::print(stderr, "vorocast-simulation: {}\n", std::string(status.message()));
+    return status.ok() ? EXIT_SUCCESS : EXIT_FAILURE;
+  }
+  if (live_command->parsed()) {
+    live.security = live_security.Get();
+    // What comes through a pipe is a script.
+    const absl::Status status = simulation::RunLive(live, std::cin, isatty(STDIN_FILENO) == 0);
     if (!status.ok()) fmt::print(stderr, "vorocast-simulation: {}\n", std::string(status.message()));
     return status.ok() ? EXIT_SUCCESS : EXIT_FAILURE;
   }

@@ -11,6 +11,7 @@
 #include "services/simulation/effect.h"
 #include "services/simulation/shipped_effects.h"
 #include "services/simulation/simulate_executor.h"
+#include "services/storage/hdf5_artifacts.h"
 
 namespace vorocast::simulation {
 namespace {
@@ -47,6 +48,27 @@ absl::Status StatusOf(const v1::Failed& failed) {
 }
 
 }  // namespace
+
+SimulationService::SimulationService(Options options)
+    : options_(std::move(options)),
+      live_({.open_take = [this](const std::string& key) { return OpenTake(key); },
+             .sessions_max = options_.live_max,
+             .idle_max = options_.live_idle}) {}
+
+absl::StatusOr<std::shared_ptr<const geometry::TrackedTake>> SimulationService::OpenTake(const std::string& key) {
+  ASSIGN_OR_RETURN(const base::Digest digest, rpc::ParseDigest(key, "tracked_key"));
+  if (!options_.store.HasArtifact(digest, ".h5")) {
+    return absl::NotFoundError(fmt::format("tracked_key: there is no artifact {} in the folder", digest.Hex()));
+  }
+  // One read at a time: two sessions that open the same take at once need it once.
+  const std::lock_guard lock(mutex_);
+  std::erase_if(takes_, [](const auto& entry) { return entry.second.expired(); });
+  if (auto known = takes_[digest.Hex()].lock()) return known;
+  ASSIGN_OR_RETURN(geometry::TrackedTake take, storage::ReadTrackedTake(options_.store.ArtifactPath(digest, ".h5")));
+  auto shared = std::make_shared<const geometry::TrackedTake>(std::move(take));
+  takes_[digest.Hex()] = shared;
+  return shared;
+}
 
 grpc::Status SimulationService::Effects(grpc::ServerContext*, const v1::EffectsRequest*, v1::EffectsReply* reply) {
   for (const std::string& name : ShippedEffects()) {

@@ -85,7 +85,7 @@ TEST_F(GateTest, EachRoleReachesWhatItShould) {
   const std::set<std::string> reading = {"/vorocast.v1.Jobs/Get",     "/vorocast.v1.Jobs/List",  "/vorocast.v1.Jobs/Watch",
                                          "/vorocast.v1.Jobs/Explain", "/vorocast.v1.Jobs/Fetch", "/vorocast.v1.Simulation/Effects"};
   const std::set<std::string> submitting = {"/vorocast.v1.Captures/Open", "/vorocast.v1.Captures/Upload", "/vorocast.v1.Jobs/Submit",
-                                            "/vorocast.v1.Jobs/Cancel",   "/vorocast.v1.Jobs/Pause",      "/vorocast.v1.Simulation/Run"};
+                                            "/vorocast.v1.Jobs/Cancel",   "/vorocast.v1.Jobs/Pause",      "/vorocast.v1.Simulation/Run", "/vorocast.v1.Simulation/Live"};
   const std::set<std::string> working = {"/vorocast.v1.Dispatch/Work", "/vorocast.v1.Artifacts/Get", "/vorocast.v1.Artifacts/Put"};
   const auto expect = [&](const std::string& who, const std::set<std::string>& methods, bool allowed) {
     for (const std::string& method : methods) {

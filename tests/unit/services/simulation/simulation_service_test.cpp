@@ -135,6 +135,32 @@ TEST_F(SimulationServiceTest, RefusesWhatItCannotRun) {
   EXPECT_EQ(Run(tracked_.Hex(), "{", last).error_code(), grpc::StatusCode::INVALID_ARGUMENT);
 }
 
+TEST_F(SimulationServiceTest, PlaysATakeOfItsStoreLive) {
+  const auto open = [&](const std::string& key, v1::LiveFrame& frame) {
+    grpc::ClientContext context;
+    auto stream = stub_->Live(&context);
+    v1::LiveRequest request;
+    request.mutable_open()->set_tracked_key(key);
+    request.mutable_open()->set_effect_json(R"({"name": "x"})");
+    stream->Write(request);
+    stream->Read(&frame);
+    stream->WritesDone();
+    return stream->Finish();
+  };
+  for (int session = 0; session < 6; ++session) {  // more than it takes at once
+    v1::LiveFrame frame;
+    const grpc::Status status = open(tracked_.Hex(), frame);
+    ASSERT_TRUE(status.ok()) << status.error_message();
+    EXPECT_EQ(frame.scene().cells(), 36);
+    EXPECT_EQ(frame.scene().frames(), 10);
+    EXPECT_EQ(frame.requests(), 1);
+    EXPECT_TRUE(frame.paused());
+  }
+  v1::LiveFrame none;
+  EXPECT_EQ(open(base::HashBytes("no take").Hex(), none).error_code(), grpc::StatusCode::NOT_FOUND);
+  EXPECT_EQ(open("../../etc", none).error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+}
+
 TEST_F(SimulationServiceTest, ACancelledCallStopsItsRun) {
   grpc::ClientContext context;
   v1::RunRequest request;
