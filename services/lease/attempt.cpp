@@ -135,7 +135,7 @@ v1::Finished Attempt::RunSpec(const tasks::TaskSpec& spec) {
     if (!brought.ok()) return FailTransfer(brought.status(), 0);
     held = *std::move(brought);
   }
-  if (const absl::Status right = inputs_.Check(spec, store_); !right.ok()) {
+  if (const absl::Status right = inputs_.Check(spec, store_, remote_ ? InputCheck::Files::kCopies : InputCheck::Files::kStored); !right.ok()) {
     // Damage does not pass: a few attempts, in case only this worker reads it so. What is not there may be a folder that is away.
     const auto cause = absl::IsDataLoss(right) ? v1::Failed::INTERNAL : v1::Failed::STORE;
     return Fail(cause, std::string(right.message()), 0);

@@ -5,6 +5,8 @@
 
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
+#include <optional>
 
 #include <fmt/format.h>
 
@@ -43,19 +45,24 @@ absl::Status InputCheck::CheckFile(const std::string& path, const base::Digest& 
   return absl::OkStatus();
 }
 
-absl::Status InputCheck::Check(const tasks::TaskSpec& spec, const storage::ArtifactStore& store) {
+absl::Status InputCheck::Check(const tasks::TaskSpec& spec, const storage::ArtifactStore& store, Files files) {
   for (const tasks::Input& input : spec.inputs) {
-    if (!input.digest) continue;
-    absl::Status status;
-    if (input.source == tasks::Input::Source::kBlob) {
-      status = CheckFile(store.BlobPath(*input.digest, input.extension), *input.digest);
-      if (absl::IsDataLoss(status))
-        return base::Annotate(status, "a captured frame is damaged in the store; remove the file and send the take again");
-    } else if (input.content) {
-      status = CheckFile(store.ArtifactPath(*input.digest, input.extension), *input.content);
-      if (absl::IsDataLoss(status)) return base::Annotate(status, "a result is damaged in the store; 'vorocast retry' of the job makes it anew");
+    const bool is_blob = input.source == tasks::Input::Source::kBlob;
+    const std::optional<base::Digest>& expected = is_blob ? input.digest : input.content;
+    if (!input.digest || !expected) continue;
+    const std::string path = is_blob ? store.BlobPath(*input.digest, input.extension) : store.ArtifactPath(*input.digest, input.extension);
+    const absl::Status status = CheckFile(path, *expected);
+    if (!absl::IsDataLoss(status)) {
+      RETURN_IF_ERROR(status);
+    } else if (files == Files::kCopies) {
+      std::error_code ignored;
+      std::filesystem::remove(path, ignored);
+      return base::Annotate(status, "a copy was damaged in this worker's cache and has been removed; the next attempt brings it anew");
+    } else if (is_blob) {
+      return base::Annotate(status, "a captured frame is damaged in the store; remove the file and send the take again");
+    } else {
+      return base::Annotate(status, "a result is damaged in the store; 'vorocast retry' of the job makes it anew");
     }
-    RETURN_IF_ERROR(status);
   }
   return absl::OkStatus();
 }

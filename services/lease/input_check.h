@@ -18,8 +18,13 @@ namespace vorocast::lease {
 /// A file that has been read once and has not been written since is not read again. Safe to call from several threads.
 class InputCheck {
  public:
+  /// What a damaged file is.
+  enum class Files {
+    kStored,  // the result or frame itself
+    kCopies,  // a copy of it, which is removed, so that it is brought anew
+  };
   /// DATA_LOSS names the file and what to do about it; NOT_FOUND for an input that is not in the store.
-  absl::Status Check(const tasks::TaskSpec& spec, const storage::ArtifactStore& store);
+  absl::Status Check(const tasks::TaskSpec& spec, const storage::ArtifactStore& store, Files files = Files::kStored);
 
  private:
   /// What the kernel changes whenever a file's bytes are written or the file is replaced.

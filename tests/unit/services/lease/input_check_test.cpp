@@ -82,6 +82,15 @@ TEST_F(InputCheckTest, ADamagedFrameIsToBeSentAgain) {
   EXPECT_THAT(std::string(status.message()), HasSubstr("send the take again"));
 }
 
+TEST_F(InputCheckTest, ADamagedCopyIsRemoved) {
+  const tasks::Input cells = Result("some cells", "a");
+  const tasks::Input other = Result("other cells", "b");
+  Flip(store_->ArtifactPath(*cells.digest, ".h5"));
+  EXPECT_EQ(check_.Check({.inputs = {other, cells}}, *store_, InputCheck::Files::kCopies).code(), absl::StatusCode::kDataLoss);
+  EXPECT_FALSE(store_->HasArtifact(*cells.digest, ".h5"));
+  EXPECT_TRUE(store_->HasArtifact(*other.digest, ".h5"));
+}
+
 TEST_F(InputCheckTest, WhatIsNotThereIsNotFound) {
   const tasks::Input cells = Result("some cells", "a");
   fs::remove(store_->ArtifactPath(*cells.digest, ".h5"));
