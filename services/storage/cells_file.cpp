@@ -35,7 +35,10 @@ absl::StatusOr<CellsSummary> ReadCellsSummary(const std::filesystem::path& path)
   ASSIGN_OR_RETURN(summary.iterations, reader.Attribute<std::int32_t>("/", "iterations"));
   ASSIGN_OR_RETURN(const Shape sites, reader.ShapeOf<double>("/sites", {kAny, 3}));
   summary.cell_count = sites[0];
-  if (!std::isfinite(summary.surface_area)) return reader.Wrong("/@surface_area", "is not finite");
+  if (summary.cell_count == 0) return reader.Wrong("/sites", "there are no cells");
+  if (!std::isfinite(summary.energy) || !std::isfinite(summary.surface_area) || summary.iterations < 0) {
+    return reader.Wrong("/@energy", "energy, surface_area or iterations is not a number that can be");
+  }
   return summary;
 }
 

@@ -173,6 +173,9 @@ std::string FaultIn(const geometry::TrackedTake& take) {
 std::string FaultIn(const geometry::SimulatedTake& take) {
   FaultFinder finder("");
   const std::size_t steps = take.time.size();
+  for (const double metres : {take.cell_penetration_m, take.object_penetration_m, take.ground_penetration_m}) {
+    finder.Require(std::isfinite(metres) && metres >= 0, "/@cell_penetration_m, @object_penetration_m or @ground_penetration_m", "is not a depth");
+  }
   finder.Finite(take.time, "/time");
   finder.Require(std::is_sorted(take.time.begin(), take.time.end()), "/time", "does not ascend");
   finder.Require(steps == 0 ? take.cell_state.empty() : take.cell_state.size() % steps == 0, "/cells/state",
@@ -194,6 +197,7 @@ std::string FaultIn(const geometry::SimulatedTake& take) {
     const auto cells = static_cast<std::int64_t>(steps == 0 ? 0 : take.cell_state.size() / steps);
     finder.Each(morph.source, "/morph/source", "is no cell", [cells](std::int32_t cell) { return cell >= -1 && cell < cells; });
     finder.Size(morph.target.size(), pairs, "/morph/target");
+    finder.Each(morph.target, "/morph/target", "is no cell", [](std::int32_t cell) { return cell >= -1; });
     offsets(morph.vertex_offset, morph.from.size(), "/morph/vertex_offset");
     finder.Size(morph.to.size(), morph.from.size(), "/morph/to");
     finder.Finite(morph.from, "/morph/from");
@@ -235,6 +239,7 @@ std::string FaultIn(const geometry::SimulatedTake& take) {
                        "is not in the order of copies and then of cells at every instant");
       }
     }
+    finder.Each(copies.copy, "/copies/copy", "is negative", [](std::int32_t copy) { return copy >= 0; });
     finder.Size(copies.rotation.size(), rows, "/copies/rotation");
     finder.Each(copies.rotation, "/copies/rotation", "is no unit quaternion",
                 [](const Eigen::Vector4f& q) { return q.allFinite() && std::abs(q.norm() - 1) < 1e-3F; });

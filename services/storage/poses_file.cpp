@@ -31,6 +31,7 @@ void WritePoseTrackLayout(Hdf5Writer& writer, const PoseTrack& track) {
 
 std::string FaultIn(const Stretch& stretch) {
   const auto finite = [](const Vec3& x) { return x.allFinite(); };
+  if (stretch.frame < 0) return "/@frame: is negative";
   if (stretch.centroid.empty() || stretch.patch.size() != stretch.centroid.size()) return "/stretch: its cells do not each have a patch";
   if (!std::ranges::all_of(stretch.centroid, finite)) return "/stretch/centroid: a value is not finite";
   const auto outside = [&](std::int32_t patch) { return patch < 0 || patch >= stretch.motion.patch_count; };

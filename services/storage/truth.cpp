@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "services/storage/truth.h"
 
+#include <algorithm>
+
 #include <fmt/format.h>
 
 #include "services/storage/hdf5_reader.h"
@@ -39,6 +41,8 @@ absl::StatusOr<Truth> ReadTruth(const std::filesystem::path& path) {
   const auto count = static_cast<std::int64_t>(truth.part.size());
   if (count == 0) return file.Wrong("/part", "holds no point");
   ASSIGN_OR_RETURN(const std::vector<Vec3> points, (file.Rows<double, double, 3, Vec3>("/points", {kAny, count})));
+  const auto finite = [](const Vec3& point) { return point.allFinite(); };
+  if (!std::all_of(points.begin(), points.end(), finite)) return file.Wrong("/points", "a value is not finite");
   for (auto row = points.begin(); row != points.end(); row += count) truth.points.emplace_back(row, row + count);
   return truth;
 }

@@ -9,7 +9,6 @@ namespace vorocast::fuzz {
 
 const Subject kSubject = {.form = Form::kJson};
 std::vector<std::string> MadeInputs() { return {VeryDeep(R"({"eye_m": )", "}")}; }
-std::string MutateInput(const std::string& input, base::Random&) { return input; }
 
 }  // namespace vorocast::fuzz
 

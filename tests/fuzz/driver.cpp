@@ -32,11 +32,12 @@ void RunWatched(const std::string& input) {
   WatchedInputEnds();
 }
 
-/// Whether it survived.
+/// Whether it survived. The program ends, and keeps the input, when it was let through though it is wrong.
 bool RunContained(const std::string& input) {
   std::fflush(nullptr);
   const pid_t child = fork();
   if (child == 0) {
+    KeepNoInput();
     RunWatched(input);
     _exit(0);
   }
@@ -44,6 +45,10 @@ bool RunContained(const std::string& input) {
   if (child < 0 || waitpid(child, &status, 0) != child) {
     std::perror("fork");
     std::exit(2);
+  }
+  if (WIFEXITED(status) && WEXITSTATUS(status) == kLetThroughStatus) {
+    WatchedInputBegins(input);
+    std::abort();
   }
   return WIFEXITED(status) && WEXITSTATUS(status) == 0;
 }
@@ -62,7 +67,7 @@ int Run(const char* program, const Flags& flags) {
     if (!kSubject.contained || !flags.inputs.empty()) return RunWatched(input);
     if (!RunContained(input)) ++ended_badly;
   };
-  Watch(program, flags.inputs.empty() && !kSubject.contained ? flags.folder : "");
+  Watch(program, flags.inputs.empty() ? flags.folder : "");
   if (!flags.inputs.empty()) {
     for (const std::string& path : flags.inputs) run(ReadInput(path));
     std::printf("%zu inputs: nothing found\n", flags.inputs.size());

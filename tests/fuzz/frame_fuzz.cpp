@@ -14,8 +14,6 @@ std::vector<std::string> MadeInputs() {
   return inputs;
 }
 
-std::string MutateInput(const std::string& input, base::Random&) { return input; }
-
 }  // namespace vorocast::fuzz
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {

@@ -16,8 +16,6 @@ std::vector<std::string> MadeInputs() {
   return {plan::ToJson(plan::JobSpec{}).dump(), plan::ToJson(with_film).dump(), VeryDeep(R"({"effect": )", "}")};
 }
 
-std::string MutateInput(const std::string& input, base::Random&) { return input; }
-
 }  // namespace vorocast::fuzz
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {

@@ -42,8 +42,6 @@ std::vector<std::string> MadeInputs() {
           ".gltf\n" + document(R"(,"uri":"data:application/octet-stream;base64,)" + embedded + "\"")};
 }
 
-std::string MutateInput(const std::string& input, base::Random&) { return input; }
-
 }  // namespace vorocast::fuzz
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {

@@ -86,8 +86,6 @@ std::vector<std::string> MadeInputs() {
           "blob\n" + blob.SerializeAsString()};
 }
 
-std::string MutateInput(const std::string& input, base::Random&) { return input; }
-
 }  // namespace vorocast::fuzz
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {

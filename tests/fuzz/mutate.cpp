@@ -76,8 +76,6 @@ void ChangeOnce(std::string& text, const std::vector<std::string>& others, Form 
   if (form == Form::kText && !as_bytes && random.Below(2) == 0) return ChangeNumber(text, random);
   if (form == Form::kJson && !as_bytes) {
     text = MutateJson(text, others[random.Below(others.size())], random);
-  } else if (form == Form::kOwn && !as_bytes) {
-    text = MutateInput(text, random);
   } else {
     ChangeBytes(text, others, random);
   }

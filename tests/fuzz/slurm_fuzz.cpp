@@ -9,7 +9,6 @@ const Subject kSubject = {.form = Form::kJson};
 std::vector<std::string> MadeInputs() {
   return {"1-4,7,9-13:2%8", "12;cluster\n", VeryDeep(R"({"jobs": [{"name": "vorocast", "job_state": "RUNNING", "array_job_id": {"set": )", "}}]}")};
 }
-std::string MutateInput(const std::string& input, base::Random&) { return input; }
 
 }  // namespace vorocast::fuzz
 

@@ -7,8 +7,6 @@
 #include <string_view>
 #include <vector>
 
-#include "services/base/random.h"
-
 /// What a fuzz target is given: any bytes. It must neither crash, nor throw, nor take long, and may check that what a reader lets through is right.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size);
 
@@ -21,12 +19,12 @@ enum class Form : std::uint8_t {
   kBytes,  // as bytes only
   kText,   // its numbers too
   kJson,   // its values and fields too
-  kOwn,    // by MutateInput too, below
 };
 
 struct Subject {
   Form form = Form::kBytes;
   /// Inputs that a library crashes on, which only ever runs in a process of its own: each input does here too, and a crash is counted, not reported.
+  /// What Require refuses ends the program as elsewhere.
   bool contained = false;
 };
 extern const Subject kSubject;
@@ -34,11 +32,10 @@ extern const Subject kSubject;
 /// Valid inputs made by code, in addition to those under corpus/: binary files do not belong into the repository.
 std::vector<std::string> MadeInputs();
 
-/// One change of an input that is mostly valid, to one that is mostly valid but for that change; for Form::kOwn.
-std::string MutateInput(const std::string& input, base::Random& random);
-
 /// Ends the program when a target finds a value that should not have been let through; both drivers keep the input.
 void Require(bool condition, std::string_view what);
+/// How the own process of a contained input ends then.
+inline constexpr int kLetThroughStatus = 3;
 
 /// `before`, a list within lists 100,000 deep, `after`: what recurses over a value runs out of stack.
 inline std::string VeryDeep(const std::string& before, const std::string& after) {

@@ -8,7 +8,6 @@ namespace vorocast::fuzz {
 
 const Subject kSubject = {.form = Form::kJson};
 std::vector<std::string> MadeInputs() { return {VeryDeep(R"({"spec": {}, "store_root": )", "}")}; }
-std::string MutateInput(const std::string& input, base::Random&) { return input; }
 
 }  // namespace vorocast::fuzz
 

@@ -92,6 +92,8 @@ void Watch(const std::string& own_program, const std::filesystem::path& folder) 
   setrlimit(RLIMIT_CORE, &no_core);
 }
 
+void KeepNoInput() { *path = '\0'; }
+
 void WatchedInputBegins(std::string_view input) {
   current = input.data();
   current_size = input.size();
