@@ -13,6 +13,7 @@ constexpr std::int64_t kSilenceMaxS = 6;
 
 // The lock's two numbers: this program's, and one for each schema, so that two farms can share a database.
 constexpr const char* kTryLock = "SELECT pg_try_advisory_lock(1449422447, hashtext(current_schema()))";
+constexpr const char* kUnlock = "SELECT pg_advisory_unlock(1449422447, hashtext(current_schema()))";
 constexpr const char* kEndSilentHolder =
     "SELECT pg_terminate_backend(other.pid) FROM pg_locks JOIN pg_stat_activity AS holder USING (pid) JOIN pg_stat_activity AS other "
     "ON other.application_name = holder.application_name AND other.usename = holder.usename WHERE locktype = 'advisory' AND granted "
@@ -21,6 +22,12 @@ constexpr const char* kEndSilentHolder =
     "AND greatest(holder.state_change, holder.query_start, holder.backend_start) < clock_timestamp() - $1 * interval '1 second'";
 
 }  // namespace
+
+PostgresLeadership::~PostgresLeadership() {
+  const std::lock_guard lock(mutex_);
+  // A server that does not answer needs nothing given back: the lock ends with the connection.
+  if (locked_ && connection_.is_open()) connection_.Ask({kUnlock, {}}).IgnoreError();
+}
 
 absl::StatusOr<bool> PostgresLeadership::TryLock() {
   ASSIGN_OR_RETURN(const PostgresRows rows, connection_.Ask({kTryLock, {}}));

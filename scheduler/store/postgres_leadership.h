@@ -15,6 +15,10 @@ namespace vorocast::store {
 class PostgresLeadership {
  public:
   PostgresLeadership(std::string url, std::string application) : connection_(std::move(url), std::move(application)) {}
+  /// Gives the lock back. The server would, too, but only once it has noticed that the connection ended.
+  ~PostgresLeadership();
+  PostgresLeadership(const PostgresLeadership&) = delete;
+  PostgresLeadership& operator=(const PostgresLeadership&) = delete;
 
   /// Returns the new term. FAILED_PRECONDITION names the leader.
   absl::StatusOr<std::int64_t> Take(const std::string& address);

@@ -11,6 +11,9 @@
 #include <unistd.h>
 
 #include <chrono>
+#include <cstdlib>
+#include <fstream>
+#include <sstream>
 #include <thread>
 
 #include <fmt/format.h>
@@ -39,6 +42,25 @@ const passwd& OtherUser() {
   if (!user) user = getpwnam("nobody");
   VOROCAST_CHECK(user);
   return *user;
+}
+
+/// The kernel tells of a process's parent only: as the second word after its name, which stands in brackets and may hold anything.
+std::vector<pid_t> ChildrenOf(pid_t parent) {
+  std::vector<pid_t> children;
+  for (const auto& process : fs::directory_iterator("/proc")) {
+    const pid_t pid = std::atoi(process.path().filename().c_str());
+    if (pid <= 0) continue;
+    std::ifstream file(process.path() / "stat");
+    std::string line;
+    std::getline(file, line);  // empty if the process has just ended
+    const std::size_t name_end = line.rfind(')');
+    if (name_end == std::string::npos) continue;
+    std::istringstream rest(line.substr(name_end + 1));
+    std::string state;
+    pid_t of = 0;
+    if (rest >> state >> of && of == parent) children.push_back(pid);
+  }
+  return children;
 }
 
 struct Finish {
@@ -109,7 +131,10 @@ bool TemporaryPostgres::Answers() const {
 }
 
 void TemporaryPostgres::Kill() {
+  kill(pid_, SIGSTOP);  // so that it makes no further children
+  const std::vector<pid_t> sessions = ChildrenOf(pid_);
   kill(pid_, SIGKILL);
+  for (const pid_t session : sessions) kill(session, SIGKILL);
   waitpid(pid_, nullptr, 0);
   pid_ = -1;
 }
@@ -117,7 +142,7 @@ void TemporaryPostgres::Kill() {
 void TemporaryPostgres::Restart() {
   const auto deadline = std::chrono::steady_clock::now() + kStartDeadline;
   while (std::chrono::steady_clock::now() < deadline) {
-    // A killed server's processes notice its end in their own time, and until then a new one refuses to start.
+    // Until the last of a killed server's processes has ended, a new one refuses to start.
     if (pid_ < 0 || waitpid(pid_, nullptr, WNOHANG) == pid_) {
       pid_ = Launch("postgres", {"-D", (folder_ / "data").string(), "-k", folder_.string(), "-c", "listen_addresses=", "-c", "shared_buffers=64MB",
                                  "-c", fmt::format("fsync={}", durable_ ? "on" : "off"), "-c", "max_wal_size=2GB"});
