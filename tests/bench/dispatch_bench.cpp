@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
-// What the scheduler itself costs: durable leases and completions a second through the engine's own turns and commits, and how large queues
-// load, answer throughout, come back after a restart in their middle, and run to their end. Workers are simulated in one thread; they take leases and report at once, one message a worker
-// at a time, as their streams would. `bench_dispatch large` adds a graph of a million tasks.
+// What the scheduler itself costs: durable leases and completions a second through the engine's own turns and commits, and how large queues load,
+// answer throughout, come back after a restart in their middle, and run to their end. Workers are simulated in one thread; they take leases and
+// report at once, one message a worker at a time, as their streams would. `bench_dispatch large` adds a graph of a million tasks.
 #include <sys/resource.h>
 #include <unistd.h>
 
