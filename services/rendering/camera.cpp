@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 #include <tuple>
 #include <utility>
@@ -16,6 +17,7 @@ constexpr double kTrimmed = 0.001;
 constexpr float kMargin = 0.07F;         // of the window's larger side, on every side
 constexpr float kEyeDistance = 3.2F;     // in units of the extent: a long lens, as for portraits
 constexpr float kCompanionReach = 0.5F;  // in units of the extent, beyond the subject's box
+constexpr float kDebrisReach = 0.3F;     // likewise: a floor full of fallen cells must not make the performer small
 constexpr double kHeightMin = 0.5;       // in units of the width
 constexpr double kHeightMax = 1.6;
 constexpr float kToesAgree = 0.8F;
@@ -86,12 +88,18 @@ double ChooseAzimuth(const std::vector<Bounds>& pictures) {
 }
 
 absl::Status Settle(Bounds& bounds) {
+  if (bounds.centres.empty()) {
+    std::swap(bounds.centres, bounds.debris);
+    std::swap(bounds.radii, bounds.debris_radii);
+  }
   if (bounds.centres.empty()) return absl::InvalidArgumentError("there is nothing to draw: every picture is empty");
   Vec3f low;
   Vec3f high;
   std::vector<float> values(bounds.centres.size());
-  for (const Vec3f& c : bounds.centres) {
-    if (!c.allFinite()) return absl::InvalidArgumentError("a position is not finite");
+  for (const auto* spheres : {&bounds.centres, &bounds.debris}) {
+    for (const Vec3f& c : *spheres) {
+      if (!c.allFinite()) return absl::InvalidArgumentError("a position is not finite");
+    }
   }
   for (int axis = 0; axis < 3; ++axis) {
     std::ranges::transform(bounds.centres, values.begin(), [axis](const Vec3f& c) { return c[axis]; });
@@ -108,9 +116,15 @@ absl::Status Settle(Bounds& bounds) {
     kept.ground = std::min(kept.ground, c.y() - bounds.radii[i]);
   }
   kept.extent = std::max((high - low).maxCoeff(), 2 * *std::ranges::max_element(kept.radii));
-  const float reach = kCompanionReach * kept.extent;
-  for (const Vec3f& c : bounds.companions) {
-    if (((c - low).array() >= -reach).all() && ((c - high).array() <= reach).all()) kept.companions.push_back(c);
+  const auto near = [&](const Vec3f& c, float reach) {
+    return ((c - low).array() >= -reach * kept.extent).all() && ((c - high).array() <= reach * kept.extent).all();
+  };
+  std::ranges::copy_if(bounds.companions, std::back_inserter(kept.companions), [&](const Vec3f& c) { return near(c, kCompanionReach); });
+  for (std::size_t i = 0; i < bounds.debris.size(); ++i) {
+    if (!near(bounds.debris[i], kDebrisReach)) continue;
+    kept.debris.push_back(bounds.debris[i]);
+    kept.debris_radii.push_back(bounds.debris_radii[i]);
+    kept.ground = std::min(kept.ground, bounds.debris[i].y() - bounds.debris_radii[i]);
   }
   bounds = std::move(kept);
   return absl::OkStatus();
@@ -145,6 +159,7 @@ Camera FrameBounds(const Bounds& bounds, const Framing& framing) {
   };
   for (std::size_t i = 0; i < bounds.centres.size(); ++i) show(bounds.centres[i], bounds.radii[i]);
   for (const Vec3f& corner : bounds.companions) show(corner, 0);
+  for (std::size_t i = 0; i < bounds.debris.size(); ++i) show(bounds.debris[i], bounds.debris_radii[i]);
   const float margin = kMargin * std::max(right - left, top - bottom);
   left -= margin, right += margin, bottom -= margin, top += margin;
   // Too flat or too tall a window grows on both sides.

@@ -41,7 +41,9 @@ struct Bounds {
   std::vector<geometry::Vec3f> centres;
   std::vector<float> radii;
   std::vector<geometry::Vec3f> companions;  // corners of scene objects: shown too, where they are not far away
-  /// Lowest point of what is shown: where the ground is.
+  std::vector<geometry::Vec3f> debris;      // what was let go: shown too, where it is near; all there is to show, when there is nothing else
+  std::vector<float> debris_radii;
+  /// Lowest point, of the debris too: where the ground is.
   float ground = 0;
   /// Largest side of the box around it.
   float extent = 0;
@@ -52,7 +54,8 @@ struct Bounds {
 double ChooseAzimuth(const std::vector<Bounds>& pictures);
 
 /// Drops the outermost thousandth of spheres on every side (strays and what has flown off must not shrink everything else) and
-/// companions further off than the extent, and sets the ground and the extent. INVALID_ARGUMENT for no spheres or values that are not finite.
+/// companions and debris further off than a part of the extent, and sets the ground and the extent. INVALID_ARGUMENT for no spheres or values that
+/// are not finite.
 absl::Status Settle(Bounds& bounds);
 
 /// A camera of the framing's direction that shows all spheres with a margin; its height follows from them, 0.5 to 1.6 times its width.

@@ -142,8 +142,9 @@ void AddBounds(const CellsPicture& picture, Bounds& bounds) {
       for (std::int32_t v : FaceLoop(cells, face))
         squared = std::max(squared, (cells.vertices[static_cast<std::size_t>(v)] - cells.centroid[cell]).squaredNorm());
     }
-    bounds.centres.push_back((PoseOf(picture, cell) * cells.centroid[cell]).cast<float>());
-    bounds.radii.push_back(static_cast<float>(std::sqrt(squared)));
+    const bool loose = !picture.state.empty() && picture.state[cell] == geometry::CellState::kReleased;
+    (loose ? bounds.debris : bounds.centres).push_back((PoseOf(picture, cell) * cells.centroid[cell]).cast<float>());
+    (loose ? bounds.debris_radii : bounds.radii).push_back(static_cast<float>(std::sqrt(squared)));
   }
   for (const CellCopy& copy : picture.copies) {
     const auto cell = static_cast<std::size_t>(copy.cell);

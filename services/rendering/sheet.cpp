@@ -100,6 +100,8 @@ absl::StatusOr<Bounds> BoundsOfAll(const std::vector<Bounds>& pictures) {
     all.centres.insert(all.centres.end(), one.centres.begin(), one.centres.end());
     all.radii.insert(all.radii.end(), one.radii.begin(), one.radii.end());
     all.companions.insert(all.companions.end(), one.companions.begin(), one.companions.end());
+    all.debris.insert(all.debris.end(), one.debris.begin(), one.debris.end());
+    all.debris_radii.insert(all.debris_radii.end(), one.debris_radii.begin(), one.debris_radii.end());
   }
   RETURN_IF_ERROR(Settle(all));
   return all;

@@ -63,9 +63,9 @@ struct SheetLayout {
 };
 
 /// One sheet: pictures in reading order, one camera for all (from the bounds of all, without the outermost thousandth of the points and
-/// cells), ground with soft shadows, a label under each. Labels and title are ASCII; other characters are drawn as '?'.
-/// The same bytes for the same input, single-threaded. INVALID_ARGUMENT for no pictures, nothing to draw, values that are not finite, arrays
-/// of different lengths, a sheet of more than 200 million pixels.
+/// cells, and without what was released and lies far off), ground with soft shadows, a label under each. Labels and title are ASCII; other characters
+/// are drawn as '?'. The same bytes for the same input, single-threaded. INVALID_ARGUMENT for no pictures, nothing to draw, values that are not
+/// finite, arrays of different lengths, a sheet of more than 200 million pixels.
 absl::StatusOr<Image> RenderSheet(const std::vector<PointsPicture>& pictures, const SheetLayout& layout, const base::Progress& progress);
 absl::StatusOr<Image> RenderSheet(const std::vector<CellsPicture>& pictures, const SheetLayout& layout, const base::Progress& progress);
 

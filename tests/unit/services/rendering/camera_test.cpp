@@ -61,6 +61,30 @@ TEST(FrameBounds, ShowsEverythingFromEverySideAndUpright) {
   }
 }
 
+TEST(Settle, FramesThePerformerAndNotAFloorFullOfDebris) {
+  const Bounds body = RandomBody(3, {0.5F, 1.8F, 0.3F});
+  Bounds bounds = body;
+  for (int i = 0; i < 400; ++i) {  // 4 m to both sides, half a metre below
+    bounds.debris.emplace_back(-4.0F + 0.02F * static_cast<float>(i), -0.5F, 0.0F);
+    bounds.debris_radii.push_back(0.01F);
+  }
+  ASSERT_TRUE(Settle(bounds).ok());
+  EXPECT_NEAR(bounds.extent, 1.8, 0.02);
+  EXPECT_FLOAT_EQ(bounds.ground, -0.51F);  // what lies near must lie on the ground, not under it
+  ASSERT_FALSE(bounds.debris.empty());
+  for (const Vec3f& c : bounds.debris) EXPECT_LT(std::abs(c.x()), 0.25 + 0.3 * 1.8 + 0.02);
+  const Camera camera = FrameBounds(bounds, {.azimuth_deg = 0, .elevation_deg = 10, .width = 300});
+  for (const Vec3f& c : bounds.debris) {
+    const Eigen::Vector2f pixel = Project(camera, c);
+    EXPECT_TRUE(pixel.x() > 0 && pixel.x() < 300 && pixel.y() > 0 && pixel.y() < static_cast<float>(camera.height)) << pixel;
+  }
+  // Where everything was let go, that is what there is to see.
+  Bounds fallen{.debris = body.centres, .debris_radii = body.radii};
+  ASSERT_TRUE(Settle(fallen).ok());
+  EXPECT_NEAR(fallen.extent, 1.8, 0.02);
+  EXPECT_FALSE(fallen.centres.empty());
+}
+
 TEST(Settle, LeavesStraysOutOfTheFrame) {
   Bounds bounds = RandomBody(2, {0.5F, 1.8F, 0.3F});
   bounds.centres.emplace_back(500.0F, -300.0F, 0.0F);
