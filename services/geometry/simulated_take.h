@@ -66,7 +66,8 @@ struct SimulatedTake {
 
   std::int64_t step_count = 0;  // of the physics, in all; not stored
   /// The deepest that things were ever in each other, metres: what the physics could not hold apart.
-  double cell_penetration_m = 0;    // two cells
+  double cell_penetration_m = 0;    // two cells: how much deeper than when they began to collide, or at any time since
+  double cell_overlap_m = 0;        // two cells that were in each other already when they began to collide
   double object_penetration_m = 0;  // a cell in an object
   double ground_penetration_m = 0;  // a cell in the ground
 };

@@ -33,15 +33,26 @@ class CellHull : public btConvexHullShape {
   Faces normal_x, normal_y, normal_z, plane_offset;  // outwards: a face's points have normal·x = offset
   int corner_count = 0;
   float radius = 0;                          // CellShape::radius in Bullet units
+  float inner_radius = 0;                    // of the sphere about the body's origin that fits in, margin included; 0 if the origin is outside
   std::vector<Eigen::Vector3f> all_corners;  // with those that the hull was thinned out of: the ground is flat, and shows what sinks into it
+};
+
+/// How deep cells were in each other in a step, Bullet units.
+struct CellOverlaps {
+  float pressed = 0;  // how much deeper two cells got than they were when they began to collide, or have been since
+  float begun = 0;    // how deep two cells were in each other when they began to collide
 };
 
 /// Contacts between two cells by separating axes: the face normals of both hulls and the line between the centres. Leaving out the
 /// crossed edges costs little on such lumps, and this is an order of magnitude cheaper than GJK and EPA. The axis that separated a pair
 /// in the last step is tried first and mostly settles it.
+///
+/// Two cells that are going to meet within the step are in contact before they do: the solver lets them come as near as they are apart, and
+/// no farther. Two that begin to collide while they are in each other (recalled cells may be, and then one is let go) are not thrown apart:
+/// they may get no deeper, and are let out at a bounded speed.
 class CellCollision : public btCollisionAlgorithm {
  public:
-  explicit CellCollision(const btCollisionAlgorithmConstructionInfo& info) : btCollisionAlgorithm(info) {}
+  CellCollision(const btCollisionAlgorithmConstructionInfo& info, CellOverlaps* overlaps) : btCollisionAlgorithm(info), overlaps_(overlaps) {}
   ~CellCollision() override;
 
   void processCollision(const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b, const btDispatcherInfo& info,
@@ -55,11 +66,17 @@ class CellCollision : public btCollisionAlgorithm {
   struct Factory : btCollisionAlgorithmCreateFunc {
     btCollisionAlgorithm* CreateCollisionAlgorithm(btCollisionAlgorithmConstructionInfo& info, const btCollisionObjectWrapper* a,
                                                    const btCollisionObjectWrapper* b) override;
+    CellOverlaps overlaps;  // of all pairs, since it was last cleared
   };
 
  private:
+  float Allowed(float depth);
+
+  CellOverlaps* overlaps_;
   btPersistentManifold* manifold_ = nullptr;  // only while there is contact
   int last_axis_ = -1;                        // face of a, or kFaces + face of b, that separated the pair
+  bool begun_ = false;
+  float least_depth_ = 0;  // Bullet units, that the two have had since they began to collide
 };
 
 /// Contacts between a cell and an endless plane: each corner that touches it, at once.
@@ -104,8 +121,9 @@ struct Separation {
   Touch touches[kTouchesMax];                        // the deepest first
 };
 
-/// `last_axis`: tried first; when it shows more than `enough`, the search ends there.
+/// `last_axis`: tried first; when it shows more than `enough`, the search ends there. `way`: that b is going to go, in the world and as seen
+/// from a. Then nothing touches only if some axis shows more than `enough` before and after, and corners touch that are on the way.
 Separation FindSeparation(const CellHull& a, const btTransform& world_from_a, const CellHull& b, const btTransform& world_from_b, float enough,
-                          int last_axis);
+                          int last_axis, const Eigen::Vector3f& way = Eigen::Vector3f::Zero());
 
 }  // namespace vorocast::simulation

@@ -79,6 +79,7 @@ void EffectRun::Record(geometry::SimulatedTake& result) const {
   result.time.push_back(time());
   run_->Record(cells_, result);
   result.cell_penetration_m = run_->deepest_penetration().cells;
+  result.cell_overlap_m = run_->deepest_penetration().begun;
   result.object_penetration_m = run_->deepest_penetration().objects;
   result.ground_penetration_m = run_->deepest_penetration().ground;
 }

@@ -5,6 +5,7 @@
 #include <BulletCollision/BroadphaseCollision/btDispatcher.h>
 #include <BulletCollision/CollisionDispatch/btCollisionObject.h>
 #include <BulletCollision/CollisionShapes/btConvexHullShape.h>
+#include <BulletDynamics/Dynamics/btRigidBody.h>
 
 #include <algorithm>
 #include <bit>
@@ -14,7 +15,10 @@ namespace vorocast::simulation {
 namespace {
 
 constexpr float kPad = 0.1F;          // Bullet units; contacts form up to a few hundredths apart
+constexpr float kWayMax = 5;          // Bullet units: what goes farther in a step does not make the grid any coarser
 constexpr float kLargeByMean = 2.5F;  // a cell with a radius of this many times the mean would make the grid too coarse
+
+float Square(float x) { return x * x; }
 
 bool Before(const btBroadphasePair& a, const btBroadphasePair& b) {
   if (a.m_pProxy0->m_uniqueId != b.m_pProxy0->m_uniqueId) return a.m_pProxy0->m_uniqueId < b.m_pProxy0->m_uniqueId;
@@ -28,6 +32,15 @@ bool FilterLets(const btBroadphaseProxy& a, const btBroadphaseProxy& b) {
 bool BoxesMeet(const btBroadphaseProxy& a, const btBroadphaseProxy& b) {
   for (int axis = 0; axis < 3; ++axis) {
     if (a.m_aabbMin[axis] > b.m_aabbMax[axis] || b.m_aabbMin[axis] > a.m_aabbMax[axis]) return false;
+  }
+  return true;
+}
+
+/// Whether two boxes meet while b goes `way` as seen from a, and anything may be nearer by `slack`.
+bool BoxesMeet(const btBroadphaseProxy& a, const btBroadphaseProxy& b, const btVector3& way, float slack) {
+  for (int axis = 0; axis < 3; ++axis) {
+    if (a.m_aabbMin[axis] > b.m_aabbMax[axis] + std::max(way[axis], 0.0F) + slack) return false;
+    if (b.m_aabbMin[axis] + std::min(way[axis], 0.0F) - slack > a.m_aabbMax[axis]) return false;
   }
   return true;
 }
@@ -145,6 +158,16 @@ void NearPairBroadphase::aabbTest(const btVector3& aabb_min, const btVector3& aa
   }
 }
 
+void NearPairBroadphase::SetWay(const Proxy& proxy, Entry& entry) const {
+  entry.way.setZero();
+  entry.turn = 0;
+  const auto* body = btRigidBody::upcast(static_cast<const btCollisionObject*>(proxy.m_clientObject));
+  if (body == nullptr || (body->isStaticObject() && !body->isKinematicObject()) || look_ahead_ == 0) return;
+  entry.way = look_ahead_ * body->getLinearVelocity();
+  const float radius = proxy.radius > 0 ? proxy.radius : 0.5F * (proxy.m_aabbMax - proxy.m_aabbMin).length();
+  entry.turn = look_ahead_ * radius * body->getAngularVelocity().length();
+}
+
 void NearPairBroadphase::FillGrid() {
   double radius_sum = 0;
   int cells = 0;
@@ -156,15 +179,25 @@ void NearPairBroadphase::FillGrid() {
   entries_.clear();
   large_.clear();
   float radius_max = 0;
+  btVector3 slowest(BT_LARGE_FLOAT, BT_LARGE_FLOAT, BT_LARGE_FLOAT);
+  btVector3 fastest = -slowest;
   for (std::size_t i = 0; i < proxies_.size(); ++i) {
     const Proxy& proxy = *proxies_[i];
     const btVector3& origin = static_cast<const btCollisionObject*>(proxy.m_clientObject)->getWorldTransform().getOrigin();
     const bool gridded = proxy.radius > 0 && proxy.radius <= largest;
-    entries_.push_back({origin.x(), origin.y(), origin.z(), proxy.radius, {0, 0, 0}, static_cast<std::int32_t>(i), gridded});
-    if (gridded) radius_max = std::max(radius_max, proxy.radius);
-    if (!gridded) large_.push_back(static_cast<std::int32_t>(i));
+    entries_.push_back({origin.x(), origin.y(), origin.z(), proxy.radius, {0, 0, 0}, 0, {0, 0, 0}, static_cast<std::int32_t>(i), gridded});
+    SetWay(proxy, entries_.back());
+    if (gridded) {
+      radius_max = std::max(radius_max, proxy.radius);
+      slowest.setMin(entries_.back().way);
+      fastest.setMax(entries_.back().way);
+    } else {
+      large_.push_back(static_cast<std::int32_t>(i));
+    }
   }
-  const float inverse_edge = 1 / (2 * radius_max + kPad);
+  // What all have in common brings none nearer to another.
+  const float way_max = fastest.x() < slowest.x() ? 0 : std::min((fastest - slowest).length(), kWayMax);
+  const float inverse_edge = 1 / (2 * radius_max + kPad + way_max);
   bucket_mask_ = std::bit_ceil(static_cast<std::uint32_t>(2 * entries_.size() + 1)) - 1;
   bucket_.assign(bucket_mask_ + 2, 0);
   constexpr float kFarthest = 1e9F;  // cubes away; keeps the cast within int
@@ -200,7 +233,10 @@ void NearPairBroadphase::FindNeighbours(std::int32_t order, std::vector<std::int
   const Proxy& proxy = *proxies_[static_cast<std::size_t>(order)];
   const auto try_box = [&](std::int32_t other) {
     const Proxy& other_proxy = *proxies_[static_cast<std::size_t>(other)];
-    if (FilterLets(proxy, other_proxy) && BoxesMeet(proxy, other_proxy) && !ArePartners(proxy, other_proxy)) neighbours.push_back(other);
+    const Entry& entry = entries_[static_cast<std::size_t>(other)];
+    if (FilterLets(proxy, other_proxy) && BoxesMeet(proxy, other_proxy, entry.way - own.way, own.turn + entry.turn) &&
+        !ArePartners(proxy, other_proxy))
+      neighbours.push_back(other);
   };
   if (!own.gridded) {
     for (auto other = order + 1; other < static_cast<std::int32_t>(entries_.size()); ++other) try_box(other);
@@ -224,7 +260,8 @@ void NearPairBroadphase::FindNeighbours(std::int32_t order, std::vector<std::int
           const float y = own.y - other.y;
           const float z = own.z - other.z;
           const float reach = own.radius + other.radius + kPad;
-          if (x * x + y * y + z * z <= reach * reach) try_box(other.order);
+          const float squared = x * x + y * y + z * z;
+          if (squared <= reach * reach || squared <= Square(reach + (other.way - own.way).length())) try_box(other.order);
         }
       }
     }

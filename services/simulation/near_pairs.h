@@ -42,10 +42,13 @@ class PairList : public btOverlappingPairCache {
 };
 
 /// A broadphase for thousands of lumps of about one size, all moving: at every step the lumps are sorted into a grid of cubes as large as the
-/// largest, and two whose spheres and boxes meet are a pair. Three times as fast as Bullet's trees on a heap of cells, where nearly every
-/// leaf moves at every step. The few other bodies (scene objects, the ground, cells far larger than the rest) are tried against everything.
+/// largest, and two whose spheres and boxes meet, now or within the step, are a pair. Three times as fast as Bullet's trees on a heap of cells, where
+/// nearly every leaf moves at every step. The few other bodies (scene objects, the ground, cells far larger than the rest) are tried against
+/// everything.
 class NearPairBroadphase : public btBroadphaseInterface {
  public:
+  /// Bodies that meet within this many seconds, should they go on as they are, are near each other. 0: only those that meet now.
+  void LookAhead(double seconds) { look_ahead_ = static_cast<float>(seconds); }
   /// Bodies whose user indices are partners ([n] lists) are never near each other.
   void LetPartnersOverlap(const std::vector<std::vector<std::int32_t>>* partners) { partners_ = partners; }
   btBroadphaseProxy* createProxy(const btVector3& aabb_min, const btVector3& aabb_max, int shape_type, void* object, int group, int mask,
@@ -69,12 +72,15 @@ class NearPairBroadphase : public btBroadphaseInterface {
   /// A proxy's place in this step's grid.
   struct Entry {
     float x, y, z, radius;
+    btVector3 way;  // that it goes in the step
+    float turn;     // the most that its turning moves any of its points by
     std::int32_t cube[3];
     std::int32_t order;  // in proxies_
     bool gridded;
   };
 
   void FillGrid();
+  void SetWay(const Proxy& proxy, Entry& entry) const;
   bool ArePartners(const btBroadphaseProxy& a, const btBroadphaseProxy& b) const;
   void FindNeighbours(std::int32_t order, std::vector<std::int32_t>& neighbours) const;
 
@@ -84,6 +90,7 @@ class NearPairBroadphase : public btBroadphaseInterface {
   std::vector<Proxy*> free_;
   std::vector<Proxy*> proxies_;  // ascending ids
   int last_id_ = 0;
+  float look_ahead_ = 0;
 
   // Of the step at hand; members only to keep their memory.
   std::vector<Entry> entries_;        // as proxies_

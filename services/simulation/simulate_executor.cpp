@@ -30,8 +30,9 @@ absl::Status SimulateExecutor::Execute(const tasks::TaskSpec& spec, const storag
   }
   ASSIGN_OR_RETURN(const geometry::SimulatedTake result, Simulate(take, options.effect, progress, {}, target ? &*target : nullptr));
   // To the log of the process that holds the lease.
-  fmt::print(stderr, "deepest penetration: cells {:.1f} mm, objects {:.1f} mm, ground {:.1f} mm\n", 1e3 * result.cell_penetration_m,
-             1e3 * result.object_penetration_m, 1e3 * result.ground_penetration_m);
+  fmt::print(stderr,
+             "deepest penetration: cells {:.1f} mm (overlapping when they began to collide: {:.1f} mm), objects {:.1f} mm, ground {:.1f} mm\n",
+             1e3 * result.cell_penetration_m, 1e3 * result.cell_overlap_m, 1e3 * result.object_penetration_m, 1e3 * result.ground_penetration_m);
   const storage::Provenance provenance{.kind = std::string(tasks::Name(spec.kind)),
                                        .key = spec.Key().Hex(),
                                        .kernel_version = tasks::KernelVersion(spec.kind),

@@ -109,6 +109,7 @@ absl::Status SimulationRun::Step(double dt) {
   RETURN_IF_ERROR(ReadBackCells());
   const World::Penetration now = world_.DeepestPenetration();
   deepest_ = {.cells = std::max(deepest_.cells, now.cells),
+              .begun = std::max(deepest_.begun, now.begun),
               .objects = std::max(deepest_.objects, now.objects),
               .ground = std::max(deepest_.ground, now.ground)};
   std::swap(previous_target_, target_);

@@ -48,8 +48,8 @@ absl::Status TryEffect(const TryOptions& options) {
   fmt::print("{}: {} cells, {:.2f} s stored as {} frames, {} steps, {:.2f} s CPU, {:.2f} ms a step\n", effect["name"].get<std::string>(),
              take.cell_count(), result.time.back(), result.time.size(), result.step_count, cpu_s,
              1e3 * cpu_s / std::max(1.0, static_cast<double>(result.step_count)));
-  fmt::print("deepest penetration: cells {:.1f} mm, objects {:.1f} mm, ground {:.1f} mm\n", 1e3 * result.cell_penetration_m,
-             1e3 * result.object_penetration_m, 1e3 * result.ground_penetration_m);
+  fmt::print("deepest penetration: cells {:.1f} mm (overlapping when they began to collide: {:.1f} mm), objects {:.1f} mm, ground {:.1f} mm\n",
+             1e3 * result.cell_penetration_m, 1e3 * result.cell_overlap_m, 1e3 * result.object_penetration_m, 1e3 * result.ground_penetration_m);
   if (!options.out.empty()) {
     RETURN_IF_ERROR(storage::WriteSimulatedTake(options.out, result, {.kind = "simulate", .options_json = effect.dump()}));
   }

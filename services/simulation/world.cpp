@@ -55,9 +55,25 @@ void PlaceBody(btRigidBody& body, const BodyState& state, const Quat& cell_from_
   body.setInterpolationAngularVelocity(body.getAngularVelocity());
 }
 
+/// Bullet takes a kinematic body's velocity from where it was before, and finds contacts where it is now: with cells, which are where the step
+/// begins. So it is left there as well, and told that it was before where it comes to be at `next` by the same motion again.
+void AimKinematic(btRigidBody& body, const btTransform& next) {
+  const btTransform now = body.getWorldTransform();
+  const btMatrix3x3 turn = next.getBasis() * now.getBasis().transpose();
+  body.setInterpolationWorldTransform(btTransform(turn.transpose() * now.getBasis(), 2 * now.getOrigin() - next.getOrigin()));
+}
+
 void SetSurface(btRigidBody& body, const Surface& surface) {
   body.setFriction(static_cast<float>(surface.friction));
   body.setRestitution(static_cast<float>(surface.restitution));
+}
+
+/// Whether the way from one point to another comes within `pad` of a box.
+bool SegmentNears(const btVector3& from, const btVector3& to, const btVector3& low, const btVector3& high, float pad) {
+  for (int axis = 0; axis < 3; ++axis) {
+    if (std::max(from[axis], to[axis]) + pad < low[axis] || std::min(from[axis], to[axis]) - pad > high[axis]) return false;
+  }
+  return true;
 }
 
 struct CellBody {
@@ -90,6 +106,7 @@ struct ObjectBody {
   double mass = 0;
   double arm = 0;  // of a pendulum, metres
   bool driven = false;
+  btTransform next;  // where the coming step takes a driven one
 };
 
 }  // namespace
@@ -139,6 +156,63 @@ struct World::Bodies {
   std::vector<CellBody> cells;
   std::vector<ObjectBody> objects;
   btVector3 gravity{0, 0, 0};
+  // Where the step at hand began, world.
+  std::vector<btVector3> centres_before;    // [n] of cells
+  std::vector<btTransform> objects_before;  // [m]
+
+  void RememberPlaces() {
+    if (objects.empty()) return;
+    objects_before.clear();
+    for (const ObjectBody& object : objects) objects_before.push_back(object.body->getWorldTransform());
+    centres_before.resize(cells.size());
+    for (std::size_t c = 0; c < cells.size(); ++c) centres_before[c] = cells[c].body->getWorldTransform().getOrigin();
+  }
+
+  /// No released cell's middle goes through an object's surface, however fast: what contacts have not stopped is put back on its own way to where
+  /// the largest ball in it just touches, or as near as it was, and keeps none of the speed that took it there.
+  void HoldOutOfObjects(double dt) {
+    const auto step = static_cast<float>(dt);
+    for (std::size_t i = 0; i < objects.size(); ++i) {
+      btRigidBody& object = *objects[i].body;
+      btVector3 low;
+      btVector3 high;
+      object.getCollisionShape()->getAabb(btTransform::getIdentity(), low, high);
+      const btTransform now = object.getWorldTransform();
+      for (std::size_t c = 0; c < cells.size(); ++c) {
+        CellBody& cell = cells[c];
+        if (!cell.inside || !cell.released) continue;
+        const float keep = cell.shape->inner_radius;
+        const btVector3 from = objects_before[i].invXform(centres_before[c]);
+        const btVector3 to = now.invXform(cell.body->getWorldTransform().getOrigin());
+        const float length = (to - from).length();
+        if (length < 1e-4F || !SegmentNears(from, to, low, high, keep)) continue;
+        const btVector3 beyond = to + (keep / length) * (to - from);  // the ball's front
+        btCollisionWorld::ClosestRayResultCallback hit(from, beyond);
+        btCollisionWorld::rayTestSingle(btTransform(btQuaternion::getIdentity(), from), btTransform(btQuaternion::getIdentity(), beyond), &object,
+                                        object.getCollisionShape(), btTransform::getIdentity(), hit);
+        if (!hit.hasHit()) continue;
+        const btVector3 normal = hit.m_hitNormalWorld.normalized();  // towards where the cell came from
+        const btVector3 place = from.lerp(beyond, hit.m_closestHitFraction);
+        const float before = normal.dot(from - place);
+        const float after = normal.dot(to - place);
+        const float wanted = std::min(before, keep);
+        if (before <= 0 || after >= wanted) continue;
+        const btVector3 held = from.lerp(to, (before - wanted) / (before - after));
+        btTransform pose = cell.body->getWorldTransform();
+        pose.setOrigin(now * held);
+        cell.body->setWorldTransform(pose);
+        cell.body->setInterpolationWorldTransform(pose);
+        // As seen from the object, whose own motion carries the cell along.
+        const btVector3 out = now.getBasis() * normal;
+        const btVector3 surface = (pose.getOrigin() - objects_before[i] * held) / step;
+        const btVector3 velocity = cell.body->getLinearVelocity();
+        const float inwards = out.dot(velocity - surface);
+        if (inwards < 0) cell.body->setLinearVelocity(velocity - inwards * out);
+        cell.body->activate();
+      }
+    }
+  }
+
   double in_ground = 0;  // metres, the deepest that a cell was left below the ground
 
   /// What Bullet's contacts leave undone for cells on the ground. A few iterations cannot carry a heap on a light cell: what is left below
@@ -234,6 +308,7 @@ void World::AddObject(const SceneBody& scene_body) {
   // Held objects and fixed ones have no mass until they are let go.
   object.body = std::make_unique<btRigidBody>(btRigidBody::btRigidBodyConstructionInfo(0, nullptr, object.shape.get()));
   PlaceBody(*object.body, {.position = scene_body.start.position, .rotation = scene_body.start.rotation}, Quat::Identity());
+  object.next = object.body->getWorldTransform();
   object.body->setDamping(0, 0);
   SetSurface(*object.body, scene_body.surface);
   if (object.driven) {
@@ -314,8 +389,7 @@ bool World::Sleeps(std::size_t index) const { return !bodies_->cells[index].body
 void World::Drive(std::size_t index, const Rigid3& world_from_body) {
   ObjectBody& object = bodies_->objects[index];
   VOROCAST_CHECK(object.driven);
-  // Bullet takes a kinematic body's velocity from where it was at its last step.
-  object.body->setWorldTransform(ToBullet(world_from_body.translation, world_from_body.rotation));
+  object.next = ToBullet(world_from_body.translation, world_from_body.rotation);
 }
 
 void World::Loosen(std::size_t index, const BodyState& state) {
@@ -346,23 +420,31 @@ geometry::Box3 World::ObjectBounds(std::size_t index) const {
 }
 
 void World::Step(double dt) {
+  bodies_->cell_collisions.overlaps = {};
+  bodies_->broadphase.LookAhead(dt);
+  for (ObjectBody& object : bodies_->objects) {
+    if (object.driven) AimKinematic(*object.body, object.next);
+  }
+  bodies_->RememberPlaces();
   bodies_->world.stepSimulation(static_cast<float>(dt), 0);
+  for (ObjectBody& object : bodies_->objects) {
+    if (object.driven) object.body->setWorldTransform(object.next);
+  }
+  bodies_->HoldOutOfObjects(dt);
   if (bodies_->ground) bodies_->SettleOnGround(dt);
 }
 
 World::Penetration World::DeepestPenetration() const {
-  Penetration deepest{.ground = bodies_->in_ground};
+  const CellOverlaps& overlaps = bodies_->cell_collisions.overlaps;
+  Penetration deepest{.cells = overlaps.pressed / kUnits, .begun = overlaps.begun / kUnits, .ground = bodies_->in_ground};
   const btDispatcher& dispatcher = bodies_->dispatcher;
   for (int m = 0; m < dispatcher.getNumManifolds(); ++m) {
     const btPersistentManifold& manifold = *bodies_->dispatcher.getManifoldByIndexInternal(m);
     const int groups =
         manifold.getBody0()->getBroadphaseHandle()->m_collisionFilterGroup | manifold.getBody1()->getBroadphaseHandle()->m_collisionFilterGroup;
-    if ((groups & kGround) != 0 || (groups & (kRecalledCell | kReleasedCell)) == 0) continue;
-    double depth = 0;
+    if ((groups & kGround) != 0 || (groups & kObject) == 0 || (groups & (kRecalledCell | kReleasedCell)) == 0) continue;
     for (int i = 0; i < manifold.getNumContacts(); ++i)
-      depth = std::max(depth, -static_cast<double>(manifold.getContactPoint(i).getDistance()) / kUnits);
-    double& kind = (groups & kObject) != 0 ? deepest.objects : deepest.cells;
-    kind = std::max(kind, depth);
+      deepest.objects = std::max(deepest.objects, -static_cast<double>(manifold.getContactPoint(i).getDistance()) / kUnits);
   }
   return deepest;
 }

@@ -60,7 +60,8 @@ class World {
 
   /// How deep things were in each other at the last step's collision detection, metres; of the ground, what was left after the step.
   struct Penetration {
-    double cells = 0;    // of two cells
+    double cells = 0;    // of two cells: how much deeper than when they began to collide, or at any time since
+    double begun = 0;    // of two cells that were in each other when they began to collide
     double objects = 0;  // of a cell in an object
     double ground = 0;   // of a cell in the ground
   };

@@ -135,6 +135,7 @@ absl::Status WriteSimulatedTake(const std::filesystem::path& path, const Simulat
   WriteRoot(writer, kSimulatedContent, provenance);
   writer.Attribute("/", "effect", take.effect_json);
   writer.Attribute("/", "cell_penetration_m", take.cell_penetration_m);
+  writer.Attribute("/", "cell_overlap_m", take.cell_overlap_m);
   writer.Attribute("/", "object_penetration_m", take.object_penetration_m);
   writer.Attribute("/", "ground_penetration_m", take.ground_penetration_m);
   writer.Dataset<double>("/time", {steps}, take.time.data());
@@ -157,6 +158,7 @@ absl::StatusOr<SimulatedTake> ReadSimulatedTake(const std::filesystem::path& pat
   // Files of earlier kernels do not have these.
   const auto metres = [&](const char* name) { return reader.Attribute<double>("/", name).value_or(0); };
   take.cell_penetration_m = metres("cell_penetration_m");
+  take.cell_overlap_m = metres("cell_overlap_m");
   take.object_penetration_m = metres("object_penetration_m");
   take.ground_penetration_m = metres("ground_penetration_m");
   ASSIGN_OR_RETURN(take.time, reader.Dataset<double>("/time", {kAny}));

@@ -27,7 +27,7 @@ struct KindTraits {
 constexpr KindTraits kTraits[] = {
     {Kind::kTessellate, "tessellate", 2, ".h5"}, {Kind::kTemplate, "template", 2, ".h5"}, {Kind::kStretch, "stretch", 2, ".h5"},
     {Kind::kGuide, "guide", 3, ".h5"},           {Kind::kTrack, "track", 2, ".h5"},       {Kind::kAssemble, "assemble", 2, ".h5"},
-    {Kind::kSimulate, "simulate", 2, ".h5"},     {Kind::kSheet, "sheet", 4, ".png"},      {Kind::kRender, "render", 3, ".exr"},
+    {Kind::kSimulate, "simulate", 3, ".h5"},     {Kind::kSheet, "sheet", 4, ".png"},      {Kind::kRender, "render", 3, ".exr"},
     {Kind::kEncode, "encode", 1, ".mp4"},
 };
 
