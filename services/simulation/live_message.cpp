@@ -47,6 +47,7 @@ void Pack(const geometry::SimulatedTake& now, v1::LiveInstant& instant) {
   instant.set_objects(Bytes(objects));
   instant.set_released(static_cast<std::int32_t>(std::ranges::count(now.cell_state, geometry::CellState::kReleased)));
   instant.set_cell_penetration_m(now.cell_penetration_m);
+  instant.set_cell_overlap_m(now.cell_overlap_m);
   instant.set_object_penetration_m(now.object_penetration_m);
   instant.set_ground_penetration_m(now.ground_penetration_m);
 }
@@ -76,6 +77,7 @@ absl::Status Unpack(const v1::LiveInstant& instant, std::size_t cells, std::size
     take.object_pose.push_back({geometry::Quat(p[0], p[1], p[2], p[3]), geometry::Vec3(p[4], p[5], p[6])});
   }
   take.cell_penetration_m = instant.cell_penetration_m();
+  take.cell_overlap_m = instant.cell_overlap_m();
   take.object_penetration_m = instant.object_penetration_m();
   take.ground_penetration_m = instant.ground_penetration_m();
   return absl::OkStatus();

@@ -11,6 +11,7 @@
 #include "services/base/check.h"
 #include "services/simulation/cell_collision.h"
 #include "services/simulation/near_pairs.h"
+#include "services/simulation/object_surface.h"
 
 namespace vorocast::simulation {
 namespace {
@@ -66,14 +67,6 @@ void AimKinematic(btRigidBody& body, const btTransform& next) {
 void SetSurface(btRigidBody& body, const Surface& surface) {
   body.setFriction(static_cast<float>(surface.friction));
   body.setRestitution(static_cast<float>(surface.restitution));
-}
-
-/// Whether the way from one point to another comes within `pad` of a box.
-bool SegmentNears(const btVector3& from, const btVector3& to, const btVector3& low, const btVector3& high, float pad) {
-  for (int axis = 0; axis < 3; ++axis) {
-    if (std::max(from[axis], to[axis]) + pad < low[axis] || std::min(from[axis], to[axis]) - pad > high[axis]) return false;
-  }
-  return true;
 }
 
 struct CellBody {
@@ -168,47 +161,11 @@ struct World::Bodies {
     for (std::size_t c = 0; c < cells.size(); ++c) centres_before[c] = cells[c].body->getWorldTransform().getOrigin();
   }
 
-  /// No released cell's middle goes through an object's surface, however fast: what contacts have not stopped is put back on its own way to where
-  /// the largest ball in it just touches, or as near as it was, and keeps none of the speed that took it there.
   void HoldOutOfObjects(double dt) {
-    const auto step = static_cast<float>(dt);
     for (std::size_t i = 0; i < objects.size(); ++i) {
-      btRigidBody& object = *objects[i].body;
-      btVector3 low;
-      btVector3 high;
-      object.getCollisionShape()->getAabb(btTransform::getIdentity(), low, high);
-      const btTransform now = object.getWorldTransform();
+      const ObjectSurface surface(*objects[i].body, objects_before[i], static_cast<float>(dt));
       for (std::size_t c = 0; c < cells.size(); ++c) {
-        CellBody& cell = cells[c];
-        if (!cell.inside || !cell.released) continue;
-        const float keep = cell.shape->inner_radius;
-        const btVector3 from = objects_before[i].invXform(centres_before[c]);
-        const btVector3 to = now.invXform(cell.body->getWorldTransform().getOrigin());
-        const float length = (to - from).length();
-        if (length < 1e-4F || !SegmentNears(from, to, low, high, keep)) continue;
-        const btVector3 beyond = to + (keep / length) * (to - from);  // the ball's front
-        btCollisionWorld::ClosestRayResultCallback hit(from, beyond);
-        btCollisionWorld::rayTestSingle(btTransform(btQuaternion::getIdentity(), from), btTransform(btQuaternion::getIdentity(), beyond), &object,
-                                        object.getCollisionShape(), btTransform::getIdentity(), hit);
-        if (!hit.hasHit()) continue;
-        const btVector3 normal = hit.m_hitNormalWorld.normalized();  // towards where the cell came from
-        const btVector3 place = from.lerp(beyond, hit.m_closestHitFraction);
-        const float before = normal.dot(from - place);
-        const float after = normal.dot(to - place);
-        const float wanted = std::min(before, keep);
-        if (before <= 0 || after >= wanted) continue;
-        const btVector3 held = from.lerp(to, (before - wanted) / (before - after));
-        btTransform pose = cell.body->getWorldTransform();
-        pose.setOrigin(now * held);
-        cell.body->setWorldTransform(pose);
-        cell.body->setInterpolationWorldTransform(pose);
-        // As seen from the object, whose own motion carries the cell along.
-        const btVector3 out = now.getBasis() * normal;
-        const btVector3 surface = (pose.getOrigin() - objects_before[i] * held) / step;
-        const btVector3 velocity = cell.body->getLinearVelocity();
-        const float inwards = out.dot(velocity - surface);
-        if (inwards < 0) cell.body->setLinearVelocity(velocity - inwards * out);
-        cell.body->activate();
+        if (cells[c].inside && cells[c].released) surface.HoldOut(*cells[c].body, centres_before[c], cells[c].shape->inner_radius);
       }
     }
   }

@@ -170,6 +170,7 @@ class LiveTest : public ::testing::Test {
     v1::LiveInstant instant;
     EXPECT_TRUE(instant.ParseFromString(bytes));
     instant.clear_cell_penetration_m();
+    instant.clear_cell_overlap_m();
     instant.clear_object_penetration_m();
     instant.clear_ground_penetration_m();
     return instant.SerializeAsString();
